@@ -1,0 +1,45 @@
+"""Reflectance of rough surfaces as differentiable torch modules.
+
+Conventions, stated once:
+
+- `normal`, `light`, `view`: unit vectors (..., 3) that leave the surface, always in that order.
+- A BRDF f_r is in 1/sr and does not include the cosine. Reflected radiance = f_r * cos(light) * irradiance,
+  where irradiance is that of a surface facing the source.
+- f_r is (..., channel); albedo rho is scalar, (channel,) or (..., channel); roughness sigma [rad] is scalar or (...).
+- Light is linear; angles are radians (`sigma_from_degrees` converts).
+- Below the horizon f_r is 0 with zero gradient.
+"""
+
+from torchbrdf.brdf import BRDF, LinearBRDF, WeightedSum
+from torchbrdf.directions import Cosines
+from torchbrdf.models.lambert import Lambert
+from torchbrdf.models.oren_nayar.functional import OrenNayar, oren_nayar
+from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar, qualitative
+from torchbrdf.parameters import (
+    Constrained,
+    Interval,
+    fixed,
+    sigma_from_beckmann_alpha,
+    sigma_from_degrees,
+    sigma_from_mean_slope,
+    trainable,
+)
+
+__all__ = [
+    "BRDF",
+    "Constrained",
+    "Cosines",
+    "Interval",
+    "Lambert",
+    "LinearBRDF",
+    "OrenNayar",
+    "QualitativeOrenNayar",
+    "WeightedSum",
+    "fixed",
+    "oren_nayar",
+    "qualitative",
+    "sigma_from_beckmann_alpha",
+    "sigma_from_degrees",
+    "sigma_from_mean_slope",
+    "trainable",
+]

@@ -1,0 +1,163 @@
+"""What every BRDF is: a module from (normal, light, view) to reflectance, the sum of named parts."""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from numpy.polynomial.legendre import leggauss
+from torch import Tensor, nn
+
+from torchbrdf.directions import Cosines
+from torchbrdf.parameters import WEIGHT, Constrained, declared
+
+
+class BRDF(nn.Module, ABC):
+    """Bidirectional reflectance distribution function f_r [1/sr], cosine not included.
+
+    Subclasses implement `evaluate_components`. Sums and multiples are BRDFs again:
+    `0.7 * OrenNayar() + 0.3 * Lambert()` has two trainable weights.
+    """
+
+    def forward(self, normal: Tensor, light: Tensor, view: Tensor, *, normalize: bool = False) -> Tensor:
+        """f_r (..., channel) [1/sr] for unit vectors (..., 3) that leave the surface.
+
+        Zero, with zero gradient, unless light and view are both above the horizon. Raises what
+        `Cosines.of` raises; `normalize=True` scales the vectors to unit length first.
+        """
+        return self.evaluate(Cosines.of(normal, light, view, normalize=normalize))
+
+    def components(self, normal: Tensor, light: Tensor, view: Tensor, *, normalize: bool = False) -> dict[str, Tensor]:
+        """The named parts (..., channel) [1/sr] whose sum is `forward`."""
+        cosines = Cosines.of(normal, light, view, normalize=normalize)
+        parts = self.evaluate_components(cosines)
+        return {name: cosines.zero_below_horizon(part) for name, part in parts.items()}
+
+    def evaluate(self, cosines: Cosines) -> Tensor:
+        """f_r (..., channel) [1/sr] from cosines computed once (see `Cosines.of`)."""
+        return cosines.zero_below_horizon(_sum(self.evaluate_components(cosines).values()))
+
+    @abstractmethod
+    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        """The named parts, each (..., channel); values below the horizon are arbitrary but finite."""
+
+    def material(self) -> dict[str, Tensor]:
+        """The constrained parameters by name."""
+        return {entry.name: getattr(self, entry.name) for entry in declared(self)}
+
+    def directional_albedo(self, cos_view: Tensor, *, nodes: int = 32) -> Tensor:
+        """Share of light from direction `cos_view` (...) that is reflected in all directions (..., channel).
+
+        Quadrature over the hemisphere: `nodes` Gauss-Legendre cosines times as many azimuths. [-]
+        By reciprocity also the radiance under uniform ambient light of radiance 1. At 32 nodes the
+        Oren-Nayar models are good to 1e-4 up to 85 degrees.
+        """
+        x, w = leggauss(nodes)
+        cos_light = cos_view.new_tensor((1 + x) / 2)[:, None]
+        weight = cos_view.new_tensor(w / 2)[:, None] * cos_light * (math.pi / nodes)
+        dphi = cos_view.new_tensor((1 + x) / 2 * math.pi)  # symmetric in dphi: half the circle, twice
+        weight = 2 * weight * cos_view.new_tensor(w / 2 * nodes)
+        mu = cos_view[..., None, None]
+        sines = ((1 - mu) * (1 + mu)).sqrt() * ((1 - cos_light) * (1 + cos_light)).sqrt()
+        cosines = Cosines.from_products(cos_light, mu, cos_light * mu + sines * dphi.cos())
+        return (self.evaluate(cosines) * weight[..., None]).sum((-3, -2))
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        # nn.Module would register an nn.Parameter under the name before the table sees it.
+        entry = getattr(type(self), name, None)
+        if isinstance(entry, Constrained):
+            entry.__set__(self, value)
+        else:
+            super().__setattr__(name, value)
+
+    def __mul__(self, weight: Tensor | float) -> "WeightedSum":
+        return WeightedSum([self], [weight])
+
+    __rmul__ = __mul__
+
+    def __add__(self, other: "BRDF") -> "WeightedSum":
+        return WeightedSum([self], [1.0]) + other
+
+
+class LinearBRDF(BRDF):
+    """A model that is linear in images of the geometry: f_r = sum_k coefficients_k(material) term_k(geometry).
+
+    The terms know nothing of the material and the coefficients nothing of the geometry, so a new
+    material on known geometry costs K multiply-adds, and a fit needs the terms once.
+    """
+
+    @abstractmethod
+    def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        """K functions of the geometry, each (...); finite, but arbitrary below the horizon."""
+
+    @abstractmethod
+    def component_coefficients(self) -> dict[str, Tensor]:
+        """What each named part takes of each term: (..., channel, K) [1/sr]."""
+
+    def basis(self, cosines: Cosines) -> Tensor:
+        """The terms as one tensor (..., K), zero below the horizon."""
+        return cosines.zero_below_horizon(torch.stack(torch.broadcast_tensors(*self.terms(cosines)), -1))
+
+    def coefficients(self) -> Tensor:
+        """(..., channel, K) [1/sr], such that f_r = (basis[..., None, :] * coefficients).sum(-1)."""
+        return _sum(self.component_coefficients().values())
+
+    def evaluate(self, cosines: Cosines) -> Tensor:
+        return cosines.zero_below_horizon(_contract(self.coefficients(), self.terms(cosines)))
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        terms = self.terms(cosines)
+        return {name: _contract(c, terms) for name, c in self.component_coefficients().items()}
+
+
+class WeightedSum(BRDF):
+    """Sum of BRDFs with trainable positive weights (part,). Components are named `Model.part`.
+
+    Raises ValueError for a weight that is not positive and finite. Whether the sum reflects more than it receives is
+    the weights' business: nothing bounds their sum.
+    """
+
+    weights: Constrained = Constrained(WEIGHT)
+
+    def __init__(self, parts: Sequence[BRDF], weights: Sequence[Tensor | float] | Tensor):
+        super().__init__()
+        self.parts = nn.ModuleList(parts)
+        values = [torch.as_tensor(w, dtype=_dtype_of(parts)).detach() for w in weights]
+        self.weights = torch.stack(values)
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        found: dict[str, Tensor] = {}
+        for position, (part, weight) in enumerate(zip(self.parts, self.weights, strict=True)):
+            for name, value in part.evaluate_components(cosines).items():  # pyright: ignore[reportCallIssue]
+                label = f"{type(part).__name__}.{name}"
+                found[f"{label}#{position}" if label in found else label] = weight * value
+        return found
+
+    def __mul__(self, weight: Tensor | float) -> "WeightedSum":
+        return WeightedSum(list(self.parts), self.weights * weight)  # pyright: ignore[reportArgumentType]
+
+    __rmul__ = __mul__
+
+    def __add__(self, other: BRDF) -> "WeightedSum":
+        parts, weights = [*self.parts], [*self.weights]
+        if isinstance(other, WeightedSum):
+            return WeightedSum([*parts, *other.parts], [*weights, *other.weights])  # pyright: ignore
+        return WeightedSum([*parts, other], [*weights, 1.0])  # pyright: ignore[reportArgumentType]
+
+
+def _contract(coefficients: Tensor, terms: tuple[Tensor, ...]) -> Tensor:
+    """sum_k coefficients[..., k] * terms[k] (..., channel), without stacking the terms."""
+    return _sum([c * t[..., None] for c, t in zip(coefficients.unbind(-1), terms, strict=True)])
+
+
+def _sum(values) -> Tensor:
+    total, *rest = values
+    for value in rest:
+        total = total + value
+    return total
+
+
+def _dtype_of(parts: Sequence[BRDF]) -> torch.dtype:
+    stored = [t for part in parts for t in (*part.parameters(), *part.buffers())]
+    return stored[0].dtype if stored else torch.get_default_dtype()

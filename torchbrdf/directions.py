@@ -1,0 +1,178 @@
+"""Directions at a surface point, reduced to the three cosines every isotropic model reads."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from torchbrdf._numerics import (
+    SUPPORTED_DTYPES,
+    angle_over_sine,
+    dot,
+    holds,
+    horizon,
+    safe_divide,
+    safe_sqrt,
+    unit_tolerance,
+)
+
+
+class _computed_once:  # noqa: N801 - used as a decorator
+    """`functools.cached_property` without the lock that torch.compile cannot enter."""
+
+    def __init__(self, compute: "Callable[[Cosines], Tensor]"):
+        self.compute = compute
+        self.name = compute.__name__
+
+    def __get__(self, instance: "Cosines", owner: type) -> Tensor:
+        value = self.compute(instance)
+        instance.__dict__[self.name] = value  # found before this descriptor from now on
+        return value
+
+
+@dataclass(frozen=True)
+class Cosines:
+    """The dot products of normal, light and view, and what models derive from them without angles.
+
+    alpha is the larger and beta the smaller of the polar angles of light and view, dphi the azimuth
+    between them. Below the horizon the cosines are replaced by those of normal incidence, so that
+    every formula stays finite there and its masked gradient is exactly zero; `zero_below_horizon`
+    puts the zeros in. The horizon itself is a cosine at or below one rounding error (2.2e-16 in
+    float64, 1.2e-7 in float32).
+
+    Attributes:
+        light: normal . light (...). [-]
+        view: normal . view (...). [-]
+        phase: light . view (...). [-]
+        above_horizon: where both light and view are above the horizon (...).
+    """
+
+    light: Tensor
+    view: Tensor
+    phase: Tensor
+    above_horizon: Tensor
+
+    @classmethod
+    def of(cls, normal: Tensor, light: Tensor, view: Tensor, *, normalize: bool = False) -> "Cosines":
+        """Cosines of directions (..., 3) that leave the surface; leading shapes broadcast.
+
+        Args:
+            normal, light, view: unit vectors (..., 3), float32 or float64, all of one dtype.
+            normalize: scale the vectors to unit length instead of refusing others.
+        Raises:
+            TypeError: a dtype other than float32 and float64 (half types lose up to 20 % at grazing
+                angles), or dtypes that differ.
+            ValueError: a trailing dimension other than 3, shapes that do not broadcast, entries that
+                are not finite, or vectors that are not of unit length.
+        """
+        vectors = {"normal": normal, "light": light, "view": view}
+        _check_shapes(vectors)
+        if normalize:
+            vectors = {name: _normalized(name, v) for name, v in vectors.items()}
+        else:
+            for name, v in vectors.items():
+                _check_unit(name, v)
+        n, s, v = vectors.values()
+        return cls.from_products(dot(n, s), dot(n, v), dot(s, v))
+
+    @classmethod
+    def from_products(cls, light: Tensor, view: Tensor, phase: Tensor) -> "Cosines":
+        """From the three dot products themselves (...), unchecked."""
+        light, view, phase = torch.broadcast_tensors(light, view, phase)
+        limit = horizon(light.dtype)
+        above = (light > limit) & (view > limit)
+        below = ~above
+        return cls(light.masked_fill(below, 1.0), view.masked_fill(below, 1.0), phase.masked_fill(below, 1.0), above)
+
+    def zero_below_horizon(self, brdf: Tensor) -> Tensor:
+        """brdf (..., channel) where light and view are above the horizon, else 0 with zero gradient."""
+        return brdf.masked_fill(~self.above_horizon[..., None], 0.0)
+
+    @_computed_once
+    def alpha(self) -> Tensor:
+        """Cosine of the larger polar angle (...)."""
+        return torch.minimum(self.light, self.view)
+
+    @_computed_once
+    def beta(self) -> Tensor:
+        """Cosine of the smaller polar angle (...)."""
+        return torch.maximum(self.light, self.view)
+
+    @_computed_once
+    def sin_alpha(self) -> Tensor:
+        """Sine of the larger polar angle (...); zero gradient at normal incidence."""
+        return safe_sqrt((1 - self.alpha) * (1 + self.alpha))
+
+    @_computed_once
+    def sin_beta(self) -> Tensor:
+        """Sine of the smaller polar angle (...); zero gradient at normal incidence."""
+        return safe_sqrt((1 - self.beta) * (1 + self.beta))
+
+    @_computed_once
+    def in_plane(self) -> Tensor:
+        """sin(alpha) sin(beta) cos(dphi) (...), smooth everywhere."""
+        return self.phase - self.light * self.view
+
+    @_computed_once
+    def across_plane(self) -> Tensor:
+        """sin(alpha) sin(beta) (1 - |cos(dphi)|) (...); zero subgradient at dphi = 90 degrees."""
+        # Rounding can leave the difference a hair below the zero that bounds it.
+        return (self.sin_alpha * self.sin_beta - self.in_plane.abs()).relu()
+
+    @_computed_once
+    def sine_ratio(self) -> Tensor:
+        """sin(beta)/sin(alpha) (...), in [0, 1]; 0 where both are 0."""
+        return safe_divide(self.sin_beta, self.sin_alpha, where=self.sin_alpha > 0)
+
+    @_computed_once
+    def alpha_over_sine(self) -> Tensor:
+        """alpha/sin(alpha) (...), by a polynomial in the cosine."""
+        return angle_over_sine(self.alpha)
+
+    @_computed_once
+    def beta_over_sine(self) -> Tensor:
+        """beta/sin(beta) (...), by a polynomial in the cosine."""
+        return angle_over_sine(self.beta)
+
+
+def _check_shapes(vectors: dict[str, Tensor]) -> None:
+    for name, v in vectors.items():
+        if not isinstance(v, Tensor):
+            raise TypeError(f"{name} must be a torch.Tensor of shape (..., 3); found {type(v).__name__}.")
+        if v.dtype not in SUPPORTED_DTYPES:
+            raise TypeError(f"{name} must be float32 or float64; found {v.dtype}. Convert with .float() or .double().")
+        if v.ndim == 0 or v.shape[-1] != 3:
+            raise ValueError(f"{name} must have shape (..., 3); found {tuple(v.shape)}.")
+    if len({v.dtype for v in vectors.values()}) > 1:
+        found = ", ".join(f"{name} {v.dtype}" for name, v in vectors.items())
+        raise TypeError(f"normal, light and view must share one dtype; found {found}.")
+    shapes = [v.shape for v in vectors.values()]
+    try:
+        torch.broadcast_shapes(*shapes)
+    except RuntimeError:
+        found = ", ".join(f"{name} {tuple(v.shape)}" for name, v in vectors.items())
+        raise ValueError(f"normal, light and view must broadcast; found {found}.") from None
+
+
+def _check_unit(name: str, v: Tensor) -> None:
+    squared = dot(v, v)
+    off = ~((squared - 1).abs() <= unit_tolerance(v.dtype))  # written so that NaN counts as off
+    if holds(~off):
+        return
+    lengths = squared[off].sqrt()
+    broken = int((~lengths.isfinite()).sum())
+    what = f"{broken} are not finite" if broken else f"lengths {lengths.min():.6g} to {lengths.max():.6g}"
+    raise ValueError(
+        f"{name} must hold finite unit vectors; {int(off.sum())} of {off.numel()} do not ({what}). "
+        "Pass normalize=True to scale finite vectors to unit length."
+    )
+
+
+def _normalized(name: str, v: Tensor) -> Tensor:
+    length = dot(v, v).sqrt()
+    usable = length.isfinite() & (length > 0)
+    if not holds(usable):
+        bad = int((~usable).sum())
+        raise ValueError(f"{name} must hold finite vectors of non-zero length; {bad} of {usable.numel()} do not.")
+    return v / length[..., None]

@@ -1,0 +1,1 @@
+"""The Oren-Nayar family: a rough surface of Lambertian facets."""

@@ -1,0 +1,87 @@
+"""Qualitative Oren-Nayar model, (30): the two-term form in common use."""
+
+import math
+from typing import final
+
+import torch
+from torch import Tensor
+
+from torchbrdf.brdf import LinearBRDF
+from torchbrdf.directions import Cosines
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+
+
+def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: float = 0.33) -> Tensor:
+    r"""Reflectance of V-cavities with Gaussian slopes, first-order form without interreflection.
+
+    .. math::
+        f_r = \frac{\rho}{\pi}\,[A + B \max(0, \cos\Delta\phi) \sin\alpha \tan\beta], \quad
+        A = 1 - \frac{\sigma^2}{2(\sigma^2 + 0.33)}, \quad B = \frac{0.45\,\sigma^2}{\sigma^2 + 0.09}
+
+    Args:
+        cosines: of light, view and phase angle, each (...).
+        albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
+        sigma: roughness, scalar or (...). [rad] in [0, pi/2]; 0 is Lambert exactly.
+        a_constant: 0.33; the paper's footnote offers 0.57 to make up for the missing interreflection.
+    Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
+    Raises: ValueError when albedo or sigma leave their domains.
+    Deviations: up to 313 % (16 % rms) from the integral at sigma = 20 deg, forward and grazing.
+        At the kink cos(dphi) = 0 the subgradient is that of the flat side.
+    Source: Oren & Nayar 1994, eq. (30) and footnote 7 of the long version.
+    """
+    ALBEDO.check("qualitative: albedo", albedo)
+    ROUGHNESS.check("qualitative: sigma", sigma)
+    coefficients = qualitative_coefficients(albedo, sigma, a_constant)
+    flat, backward = geometry_terms(cosines)
+    return cosines.zero_below_horizon(
+        coefficients[..., 0] * flat[..., None] + coefficients[..., 1] * backward[..., None]
+    )
+
+
+def geometry_terms(cosines: Cosines) -> tuple[Tensor, Tensor]:
+    """1 and max(0, cos(dphi)) sin(alpha) tan(beta), each (...), without an angle."""
+    return torch.ones_like(cosines.beta), cosines.in_plane.relu() / cosines.beta
+
+
+def qualitative_coefficients(albedo: Tensor, sigma: Tensor, a_constant: float) -> Tensor:
+    """rho/pi times (A, B): (..., channel, 2)."""
+    s2 = (sigma * sigma)[..., None]
+    a = 1 - 0.5 * s2 / (s2 + a_constant)
+    b = 0.45 * s2 / (s2 + 0.09)
+    return torch.stack(torch.broadcast_tensors(albedo * a / math.pi, albedo * b / math.pi), -1)
+
+
+@final
+class QualitativeOrenNayar(LinearBRDF):
+    """Qualitative model as a module; see `qualitative` for equation, units and deviations.
+
+    Args:
+        albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-]
+        sigma: roughness, scalar or (...). [rad]
+        a_constant: constant in A; 0.57 makes up in part for the missing interreflection.
+    Components: direct.
+    Raises: ValueError outside the domains.
+    """
+
+    albedo: Constrained = Constrained(ALBEDO)
+    sigma: Constrained = Constrained(ROUGHNESS)
+
+    def __init__(
+        self,
+        *,
+        albedo: Tensor | float | fixed = 0.5,
+        sigma: Tensor | float | fixed = 0.3,
+        a_constant: float = 0.33,
+    ):
+        super().__init__()
+        if not a_constant > 0:
+            raise ValueError(f"QualitativeOrenNayar.a_constant must be positive (0.33 or 0.57); found {a_constant}.")
+        self.albedo = albedo
+        self.sigma = sigma
+        self.a_constant = a_constant
+
+    def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        return geometry_terms(cosines)
+
+    def component_coefficients(self) -> dict[str, Tensor]:
+        return {"direct": qualitative_coefficients(self.albedo, self.sigma, self.a_constant)}

@@ -1,0 +1,153 @@
+"""Material parameters: a table in the class body; stored unconstrained, read constrained."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import overload
+
+import torch
+from torch import Tensor, nn
+
+from torchbrdf._numerics import holds
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Domain of a parameter: [low, high], or [low, inf). `unit` is "rad", or "" for a pure number.
+
+    The closed interval is what a formula accepts. A trained value lives in the open one, through a
+    logistic map (an exponential where high is infinite): it can approach a bound and never sit on it.
+    """
+
+    low: float
+    high: float
+    unit: str = ""
+
+    def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
+        """Raise ValueError unless every entry lies in the domain (strictly inside if `open_ends`)."""
+        inside = (value > self.low) & (value < self.high) if open_ends else (value >= self.low) & (value <= self.high)
+        if holds(inside):
+            return
+        finite = value[value.isfinite()]
+        found = f"min {finite.min():.6g}, max {finite.max():.6g}" if finite.numel() else "none is finite"
+        opening = "(" if open_ends else "["
+        closing = ")" if open_ends or math.isinf(self.high) else "]"
+        unit = f" {self.unit}" if self.unit else ""
+        remedy = " A trained value cannot sit on a bound: hold it there with fixed(...)." if open_ends else ""
+        raise ValueError(
+            f"{name} must lie in {opening}{self.low:.4g}, {self.high:.4g}{closing}{unit}; "
+            f"{int((~inside).sum())} of {inside.numel()} entries do not ({found}).{remedy}"
+        )
+
+    def to_raw(self, value: Tensor) -> Tensor:
+        """Unconstrained coordinate of a value inside the domain."""
+        if math.isinf(self.high):
+            return (value - self.low).log()
+        return torch.logit((value - self.low) / (self.high - self.low))
+
+    def from_raw(self, raw: Tensor) -> Tensor:
+        """Value inside the domain for any real number."""
+        if math.isinf(self.high):
+            return self.low + raw.exp()
+        return self.low + (self.high - self.low) * raw.sigmoid()
+
+
+ALBEDO = Interval(0.0, 1.0)
+ROUGHNESS = Interval(0.0, math.pi / 2, "rad")
+WEIGHT = Interval(0.0, math.inf)
+
+
+@dataclass(frozen=True)
+class fixed:  # noqa: N801 - reads as a word in `OrenNayar(sigma=fixed(0.0))`
+    """A parameter value that is not trained. It may sit on the bounds of its domain."""
+
+    value: Tensor | float
+
+
+class Constrained:
+    """A parameter of a module, declared in the class body: `sigma = Constrained(ROUGHNESS)`.
+
+    Assigning a number or tensor stores a trainable `raw_<name>` (or updates it in place); assigning
+    `fixed(value)` stores the value as the buffer `fixed_<name>`. Reading gives the constrained value.
+    """
+
+    def __init__(self, domain: Interval):
+        self.domain = domain
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name = name
+
+    @overload
+    def __get__(self, module: None, owner: type) -> "Constrained": ...
+    @overload
+    def __get__(self, module: nn.Module, owner: type) -> Tensor: ...
+    def __get__(self, module, owner):
+        if module is None:
+            return self
+        if f"fixed_{self.name}" in module._buffers:
+            return getattr(module, f"fixed_{self.name}")
+        return self.domain.from_raw(getattr(module, f"raw_{self.name}"))
+
+    def __set__(self, module: nn.Module, value: "Tensor | float | fixed") -> None:
+        held = isinstance(value, fixed)
+        tensor = _as_float_tensor(value.value if held else value)
+        self.domain.check(f"{type(module).__name__}.{self.name}", tensor, open_ends=not held)
+        raw_name, fixed_name = f"raw_{self.name}", f"fixed_{self.name}"
+        if held:
+            module._parameters.pop(raw_name, None)
+            module.register_buffer(fixed_name, tensor.clone())
+            return
+        module._buffers.pop(fixed_name, None)
+        raw = self.domain.to_raw(tensor)
+        present = module._parameters.get(raw_name)
+        if present is not None and present.shape == raw.shape:
+            with torch.no_grad():  # in place, so that an optimizer that holds the parameter follows
+                present.copy_(raw)
+        else:
+            module.register_parameter(raw_name, nn.Parameter(raw))
+
+
+def _as_float_tensor(value: Tensor | float) -> Tensor:
+    tensor = torch.as_tensor(value).detach()
+    return tensor if tensor.is_floating_point() else tensor.to(torch.get_default_dtype())
+
+
+def declared(module: nn.Module) -> Iterator[Constrained]:
+    """The constrained parameters a module's class declares, base classes first."""
+    for owner in reversed(type(module).__mro__):
+        yield from (entry for entry in vars(owner).values() if isinstance(entry, Constrained))
+
+
+def trainable(module: nn.Module) -> dict[str, tuple[str, Interval]]:
+    """Trained parameters of a module and its children: readable path -> (path of the raw one, domain)."""
+    found = {}
+    for prefix, child in module.named_modules():
+        dot = f"{prefix}." if prefix else ""
+        for entry in declared(child):
+            raw = child._parameters.get(f"raw_{entry.name}")
+            if raw is not None and raw.requires_grad:
+                found[dot + entry.name] = (f"{dot}raw_{entry.name}", entry.domain)
+    return found
+
+
+def sigma_from_degrees(degrees: Tensor | float) -> Tensor:
+    """Roughness sigma [rad] from degrees."""
+    return torch.deg2rad(_as_float_tensor(degrees))
+
+
+def sigma_from_beckmann_alpha(alpha: Tensor | float) -> Tensor:
+    """Roughness sigma [rad] of the Gaussian that matches a Beckmann width alpha: alpha/sqrt(2).
+
+    Both describe the slopes of the surface; they agree to first order in alpha (small slopes). The
+    tails differ: Beckmann is Gaussian in tan(theta), this library's sigma in theta.
+    """
+    return _as_float_tensor(alpha) / math.sqrt(2)
+
+
+def sigma_from_mean_slope(mean_slope: Tensor | float) -> Tensor:
+    """Roughness sigma [rad] from the mean slope angle of the facets [rad]: sigma = m sqrt(2/pi).
+
+    The mean of theta under the slope-area distribution exp(-theta^2/2 sigma^2) sin(theta), to first
+    order in sigma.
+    """
+    return _as_float_tensor(mean_slope) * math.sqrt(2 / math.pi)
