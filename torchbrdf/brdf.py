@@ -9,6 +9,7 @@ import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor, nn
 
+from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
 from torchbrdf.parameters import WEIGHT, Constrained, declared
 
@@ -51,17 +52,19 @@ class BRDF(nn.Module, ABC):
 
         Quadrature over the hemisphere: `nodes` Gauss-Legendre cosines times as many azimuths. [-]
         By reciprocity also the radiance under uniform ambient light of radiance 1. At 32 nodes the
-        Oren-Nayar models are good to 1e-4 up to 85 degrees.
+        Oren-Nayar models are good to 3e-4 up to 85 degrees.
         """
         x, w = leggauss(nodes)
-        cos_light = cos_view.new_tensor((1 + x) / 2)[:, None]
-        weight = cos_view.new_tensor(w / 2)[:, None] * cos_light * (math.pi / nodes)
-        dphi = cos_view.new_tensor((1 + x) / 2 * math.pi)  # symmetric in dphi: half the circle, twice
-        weight = 2 * weight * cos_view.new_tensor(w / 2 * nodes)
-        mu = cos_view[..., None, None]
-        sines = ((1 - mu) * (1 + mu)).sqrt() * ((1 - cos_light) * (1 + cos_light)).sqrt()
-        cosines = Cosines.from_products(cos_light, mu, cos_light * mu + sines * dphi.cos())
-        return (self.evaluate(cosines) * weight[..., None]).sum((-3, -2))
+        # the nodes come first, so that per-texel parameters line up with cos_view
+        column = (nodes, 1, *(1,) * cos_view.ndim)
+        cos_light = cos_view.new_tensor((1 + x) / 2).reshape(column)
+        dphi = cos_view.new_tensor((1 + x) / 2 * math.pi).reshape(column).transpose(0, 1)
+        w_light, w_dphi = (cos_view.new_tensor(w).reshape(shape) for shape in (cos_light.shape, dphi.shape))
+        # d(cos_light) d(dphi) over half the circle of azimuths, which the other half mirrors
+        weight = cos_light * (w_light / 2) * (w_dphi / 2 * math.pi) * 2
+        sines = safe_sqrt((1 - cos_view) * (1 + cos_view)) * safe_sqrt((1 - cos_light) * (1 + cos_light))
+        cosines = Cosines.from_products(cos_light, cos_view, cos_light * cos_view + sines * dphi.cos())
+        return (self.evaluate(cosines) * weight[..., None]).sum((0, 1))
 
     def __setattr__(self, name: str, value: Any) -> None:
         # nn.Module would register an nn.Parameter under the name before the table sees it.
@@ -78,6 +81,10 @@ class BRDF(nn.Module, ABC):
 
     def __add__(self, other: "BRDF") -> "WeightedSum":
         return WeightedSum([self], [1.0]) + other
+
+    def __radd__(self, other: object) -> "BRDF":
+        # sum([a, b]) starts from 0
+        return self if other == 0 else NotImplemented
 
 
 class LinearBRDF(BRDF):
@@ -114,14 +121,23 @@ class LinearBRDF(BRDF):
 class WeightedSum(BRDF):
     """Sum of BRDFs with trainable positive weights (part,). Components are named `Model.part`.
 
-    Raises ValueError for a weight that is not positive and finite. Whether the sum reflects more than it receives is
-    the weights' business: nothing bounds their sum.
+    Whether the sum reflects more than it receives is the weights' business: nothing bounds their sum.
+    Raises ValueError for a weight that is not positive and finite, or counts that differ; TypeError
+    for parts that are not BRDFs.
     """
 
     weights: Constrained = Constrained(WEIGHT)
 
     def __init__(self, parts: Sequence[BRDF], weights: Sequence[Tensor | float] | Tensor):
         super().__init__()
+        if not parts or len(parts) != len(weights):
+            raise ValueError(
+                f"WeightedSum needs one weight for each of at least one part; found {len(parts)} parts "
+                f"and {len(weights)} weights."
+            )
+        for part in parts:
+            if not isinstance(part, BRDF):
+                raise TypeError(f"WeightedSum adds BRDFs; found {type(part).__name__}.")
         self.parts = nn.ModuleList(parts)
         values = [torch.as_tensor(w, dtype=_dtype_of(parts)).detach() for w in weights]
         self.weights = torch.stack(values)

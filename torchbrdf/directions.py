@@ -170,9 +170,10 @@ def _check_unit(name: str, v: Tensor) -> None:
 
 
 def _normalized(name: str, v: Tensor) -> Tensor:
-    length = dot(v, v).sqrt()
-    usable = length.isfinite() & (length > 0)
+    largest = v.abs().amax(-1, keepdim=True).detach()  # keeps the squares from overflowing; cancels in the result
+    usable = largest.isfinite() & (largest > 0)
     if not holds(usable):
         bad = int((~usable).sum())
         raise ValueError(f"{name} must hold finite vectors of non-zero length; {bad} of {usable.numel()} do not.")
-    return v / length[..., None]
+    scaled = v / largest
+    return scaled / dot(scaled, scaled).sqrt()[..., None]

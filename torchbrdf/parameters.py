@@ -8,12 +8,15 @@ from typing import overload
 import torch
 from torch import Tensor, nn
 
-from torchbrdf._numerics import holds
+from torchbrdf._numerics import SUPPORTED_DTYPES, holds
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Domain of a parameter: [low, high], or [low, inf). `unit` is "rad", or "" for a pure number.
+    """Domain of a parameter: [low, high], or [low, inf).
+
+    `unit` is "rad", or "" for a pure number. `even` says that reflectance depends on the square of the
+    parameter near low = 0, so that its derivative vanishes there: sigma is told from 0 through sigma^2.
 
     The closed interval is what a formula accepts. A trained value lives in the open one, through a
     logistic map (an exponential where high is infinite): it can approach a bound and never sit on it.
@@ -22,6 +25,7 @@ class Interval:
     low: float
     high: float
     unit: str = ""
+    even: bool = False
 
     def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
         """Raise ValueError unless every entry lies in the domain (strictly inside if `open_ends`)."""
@@ -47,13 +51,14 @@ class Interval:
 
     def from_raw(self, raw: Tensor) -> Tensor:
         """Value inside the domain for any real number."""
-        if math.isinf(self.high):
-            return self.low + raw.exp()
-        return self.low + (self.high - self.low) * raw.sigmoid()
+        # At least 1-D inside: forward differentiation of "number * 0-d float32 tensor" yields float64.
+        row = torch.atleast_1d(raw)
+        inside = row.exp() if math.isinf(self.high) else (self.high - self.low) * row.sigmoid()
+        return (self.low + inside).reshape(raw.shape)
 
 
 ALBEDO = Interval(0.0, 1.0)
-ROUGHNESS = Interval(0.0, math.pi / 2, "rad")
+ROUGHNESS = Interval(0.0, math.pi / 2, "rad", even=True)
 WEIGHT = Interval(0.0, math.inf)
 
 
@@ -91,7 +96,10 @@ class Constrained:
     def __set__(self, module: nn.Module, value: "Tensor | float | fixed") -> None:
         held = isinstance(value, fixed)
         tensor = _as_float_tensor(value.value if held else value)
-        self.domain.check(f"{type(module).__name__}.{self.name}", tensor, open_ends=not held)
+        name = f"{type(module).__name__}.{self.name}"
+        if tensor.dtype not in SUPPORTED_DTYPES:
+            raise TypeError(f"{name} must be float32 or float64; found {tensor.dtype}.")
+        self.domain.check(name, tensor, open_ends=not held)
         raw_name, fixed_name = f"raw_{self.name}", f"fixed_{self.name}"
         if held:
             module._parameters.pop(raw_name, None)

@@ -63,6 +63,7 @@ def geometry_terms(cosines: Cosines) -> tuple[Tensor, Tensor, Tensor, Tensor]:
 
 def direct_coefficients(albedo: Tensor, sigma: Tensor) -> Tensor:
     """rho times (C1, 0.45 s, 0.125 s, 0)/pi with s = sigma^2/(sigma^2 + 0.09): (..., channel, 4)."""
+    albedo = torch.atleast_1d(albedo)
     s2 = (sigma * sigma)[..., None]
     slope = s2 / (s2 + 0.09)
     c1 = 1 - 0.5 * s2 / (s2 + 0.33)
@@ -73,6 +74,7 @@ def direct_coefficients(albedo: Tensor, sigma: Tensor) -> Tensor:
 
 def interreflection_coefficients(albedo: Tensor, sigma: Tensor) -> Tensor:
     """0.17 rho^2 sigma^2/(sigma^2 + 0.13) (1, 0, 0, -1)/pi: (..., channel, 4)."""
+    albedo = torch.atleast_1d(albedo)
     s2 = (sigma * sigma)[..., None]
     strength = 0.17 * albedo * albedo * s2 / (s2 + 0.13) / math.pi
     nothing = torch.zeros_like(strength)

@@ -45,6 +45,7 @@ def geometry_terms(cosines: Cosines) -> tuple[Tensor, Tensor]:
 
 def qualitative_coefficients(albedo: Tensor, sigma: Tensor, a_constant: float) -> Tensor:
     """rho/pi times (A, B): (..., channel, 2)."""
+    albedo = torch.atleast_1d(albedo)
     s2 = (sigma * sigma)[..., None]
     a = 1 - 0.5 * s2 / (s2 + a_constant)
     b = 0.45 * s2 / (s2 + 0.09)

@@ -1,0 +1,89 @@
+"""Every model once, with the laws it is known to break and why. Add a row for each new model."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+
+from torchbrdf import BRDF, Lambert, OrenNayar, QualitativeOrenNayar, fixed
+
+
+@dataclass(frozen=True)
+class Model:
+    """A row: how to build the model in a dtype, and its exceptions. Each exception needs a reason.
+
+    `least` is the smallest value [1/sr] the model is known to reach, `energy_limit` the largest
+    directional albedo. The tests also fail when an exception is no longer needed.
+    """
+
+    name: str
+    make: Callable[[torch.dtype], BRDF]
+    least: float = 0.0
+    energy_limit: float = 1.0
+    reason: str = ""
+
+    def __post_init__(self):
+        excepted = self.least < 0 or self.energy_limit > 1
+        if excepted != bool(self.reason):
+            raise ValueError(f"{self.name}: an exception needs a reason, and a reason an exception")
+
+
+def colour(dtype: torch.dtype) -> torch.Tensor:
+    """Albedo of a terracotta, say."""
+    return torch.tensor([0.7, 0.45, 0.3], dtype=dtype)
+
+
+def number(value: float, dtype: torch.dtype) -> torch.Tensor:
+    return torch.tensor(value, dtype=dtype)
+
+
+def mixture(dtype: torch.dtype) -> BRDF:
+    """Every model in one sum, so that one compiled graph holds them all."""
+    rough = OrenNayar(albedo=colour(dtype), sigma=number(0.5, dtype))
+    grooved = QualitativeOrenNayar(albedo=number(0.6, dtype), sigma=number(0.3, dtype))
+    return 0.5 * rough + 0.3 * grooved + 0.2 * Lambert(albedo=number(0.8, dtype))
+
+
+MODELS = [
+    Model("lambert", lambda dtype: Lambert(albedo=colour(dtype))),
+    Model("lambert, white", lambda dtype: Lambert(albedo=fixed(number(1.0, dtype)))),
+    Model("oren_nayar", lambda dtype: OrenNayar(albedo=colour(dtype), sigma=number(0.5, dtype))),
+    Model(
+        "oren_nayar, rough and dark",
+        lambda dtype: OrenNayar(albedo=number(0.05, dtype), sigma=number(1.2, dtype)),
+        least=-0.0033,
+        reason="the cubic in C2 is a fit: (27) turns negative at forward grazing for sigma > 0.66 rad",
+    ),
+    Model(
+        "oren_nayar, white",
+        lambda dtype: OrenNayar(albedo=fixed(number(1.0, dtype)), sigma=number(0.309, dtype)),
+        energy_limit=1.051,
+        reason="(27) + (28) are fitted apart and do not conserve energy: 1.0499 at grazing, rho = 1, sigma = 0.31",
+    ),
+    Model(
+        "oren_nayar, direct only",
+        lambda dtype: OrenNayar(albedo=colour(dtype), sigma=number(0.6, dtype), interreflection=False),
+    ),
+    Model(
+        "oren_nayar, interreflection only",
+        lambda dtype: OrenNayar(albedo=colour(dtype), sigma=number(0.6, dtype), direct=False),
+    ),
+    Model(
+        "oren_nayar, fixed sigma = 0", lambda dtype: OrenNayar(albedo=colour(dtype), sigma=fixed(number(0.0, dtype)))
+    ),
+    Model("qualitative", lambda dtype: QualitativeOrenNayar(albedo=colour(dtype), sigma=number(math.pi / 6, dtype))),
+    Model(
+        "qualitative, white",
+        lambda dtype: QualitativeOrenNayar(albedo=fixed(number(1.0, dtype)), sigma=number(0.2, dtype)),
+        energy_limit=1.016,
+        reason="(30) keeps B of (27) without its forward term: 1.0151 at grazing, rho = 1, sigma = 0.2",
+    ),
+    Model(
+        "qualitative, white, 0.57",
+        lambda dtype: QualitativeOrenNayar(albedo=fixed(number(1.0, dtype)), sigma=number(0.3, dtype), a_constant=0.57),
+        energy_limit=1.045,
+        reason="0.57 stands for interreflection at one albedo only: 1.0442 at grazing, rho = 1, sigma = 0.3",
+    ),
+    Model("weighted sum", mixture),
+]

@@ -1,0 +1,23 @@
+"""What every test shares: one row of the catalog at a time, and seeded directions."""
+
+import pytest
+import torch
+from catalog import MODELS, Model
+
+from torchbrdf.testing import Directions, random_directions
+
+
+@pytest.fixture(params=MODELS, ids=lambda model: model.name)
+def model(request: pytest.FixtureRequest) -> Model:
+    return request.param
+
+
+@pytest.fixture(params=[torch.float32, torch.float64], ids=["float32", "float64"])
+def dtype(request: pytest.FixtureRequest) -> torch.dtype:
+    return request.param
+
+
+@pytest.fixture
+def directions(dtype: torch.dtype) -> Directions:
+    """A thousand random ones up to 85 degrees, the same in every run."""
+    return random_directions(1000, dtype=dtype, generator=torch.Generator().manual_seed(0))

@@ -1,0 +1,166 @@
+"""Directions: what is refused and how, and what the cosines derive."""
+
+import math
+
+import pytest
+import torch
+from torch.testing import assert_close
+
+from torchbrdf import Cosines, Lambert, OrenNayar
+from torchbrdf._numerics import horizon, unit_tolerance
+from torchbrdf.testing import TOLERANCE, random_directions
+
+NAMES = ["normal", "light", "view"]
+
+
+def up(dtype=torch.float64):
+    return {name: torch.tensor([[0.0, 0.0, 1.0], [0.6, 0.0, 0.8]], dtype=dtype) for name in NAMES}
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("call", [Cosines.of, Lambert(), Lambert().components], ids=["Cosines.of", "forward", "parts"])
+class TestRefused:
+    """Each refusal names the argument, whoever is asked."""
+
+    def refuse(self, call, name, bad, error, match, **options):
+        with pytest.raises(error, match=match):
+            call(**(up() | {name: bad}), **options)
+
+    @pytest.mark.parametrize(
+        ("bad", "error", "match"),
+        [
+            ([0.0, 0.0, 1.0], TypeError, r"must be a torch.Tensor of shape \(..., 3\); found list"),
+            (torch.ones(2, 2).double(), ValueError, r"must have shape \(..., 3\); found \(2, 2\)"),
+            (torch.tensor(1.0).double(), ValueError, r"must have shape \(..., 3\); found \(\)"),
+            (torch.tensor([[0, 0, 1]]), TypeError, r"must be float32 or float64; found torch.int64"),
+            (
+                up(torch.float16)["view"],
+                TypeError,
+                r"must be float32 or float64; found torch.float16. Convert with .float\(\)",
+            ),
+            (up(torch.bfloat16)["view"], TypeError, r"must be float32 or float64; found torch.bfloat16"),
+        ],
+        ids=["list", "trailing 2", "scalar", "int", "half", "bfloat"],
+    )
+    def test_whatever_normalize_says(self, call, name, bad, error, match):
+        for normalize in (False, True):
+            self.refuse(call, name, bad, error, f"{name} {match}", normalize=normalize)
+
+    def test_mixed_dtype(self, call, name):
+        match = rf"must share one dtype; found .*{name} torch.float32"
+        self.refuse(call, name, up(torch.float32)[name], TypeError, match)
+
+    def test_shapes_that_do_not_broadcast(self, call, name):
+        bad = up()[name][[0, 0, 0]]
+        self.refuse(call, name, bad, ValueError, rf"normal, light and view must broadcast; found .*{name} \(3, 3\)")
+
+    def test_not_unit(self, call, name):
+        bad = torch.tensor([[0.0, 0.0, 1.0], [0.0, 0.0, 2.0]], dtype=torch.float64)
+        match = rf"{name} must hold finite unit vectors; 1 of 2 do not \(lengths 2 to 2\).*normalize=True"
+        self.refuse(call, name, bad, ValueError, match)
+
+    @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+    def test_not_finite(self, call, name, value):
+        bad = torch.tensor([[0.0, 0.0, 1.0], [0.0, value, 1.0]], dtype=torch.float64)
+        self.refuse(call, name, bad, ValueError, rf"{name} must hold finite unit vectors; 1 of 2 .*1 are not finite")
+        match = f"{name} must hold finite vectors of non-zero length; 1 of 2 do not"
+        self.refuse(call, name, bad, ValueError, match, normalize=True)
+
+    def test_zero_vector(self, call, name):
+        bad = torch.zeros(1, 3, dtype=torch.float64)
+        self.refuse(call, name, bad, ValueError, f"{name} must hold finite unit vectors")
+        self.refuse(call, name, bad, ValueError, f"{name} must hold .* non-zero length; 1 of 1", normalize=True)
+
+
+def test_unit_tolerance_separates_rounding_from_six_digits(dtype):
+    unit = {name: v[0] for name, v in up(dtype).items()}
+    within, beyond = (1 + k * unit_tolerance(dtype) / 2 for k in (0.9, 1.1))  # lengths; the tolerance is on |v|^2
+    Cosines.of(**(unit | {"light": unit["light"] * within}))
+    with pytest.raises(ValueError, match="light must hold finite unit vectors"):
+        Cosines.of(**(unit | {"light": unit["light"] * beyond}))
+    assert unit_tolerance(dtype) == 64 * torch.finfo(dtype).eps
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
+def test_normalize_makes_length_irrelevant(dtype, scale):
+    directions = random_directions(100, dtype=dtype, generator=torch.Generator().manual_seed(0))
+    brdf = OrenNayar().to(dtype)
+    got = brdf(*(scale * v for v in directions), normalize=True)
+    assert_close(got, brdf(*directions), rtol=TOLERANCE[dtype].rounding, atol=0)
+
+
+def test_empty_batch():
+    none = torch.zeros(0, 3)
+    assert OrenNayar()(none, none, none).shape == (0, 1)
+
+
+def polar(theta, phi):
+    return torch.stack([theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos()], -1)
+
+
+def test_derived_quantities_against_angles():
+    generator = torch.Generator().manual_seed(0)
+    theta_i, theta_r = (1.4 * torch.rand(500, dtype=torch.float64, generator=generator) + 0.05 for _ in range(2))
+    dphi = 2 * math.pi * torch.rand(500, dtype=torch.float64, generator=generator)
+    normal = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64)
+    g = Cosines.of(normal, polar(theta_i, torch.zeros_like(dphi)), polar(theta_r, dphi))
+    alpha, beta = torch.maximum(theta_i, theta_r), torch.minimum(theta_i, theta_r)
+    expected = {
+        "light": theta_i.cos(),
+        "view": theta_r.cos(),
+        "phase": theta_i.cos() * theta_r.cos() + theta_i.sin() * theta_r.sin() * dphi.cos(),
+        "alpha": alpha.cos(),
+        "beta": beta.cos(),
+        "sin_alpha": alpha.sin(),
+        "sin_beta": beta.sin(),
+        "in_plane": alpha.sin() * beta.sin() * dphi.cos(),
+        "across_plane": alpha.sin() * beta.sin() * (1 - dphi.cos().abs()),
+        "sine_ratio": beta.sin() / alpha.sin(),
+        "alpha_over_sine": alpha / alpha.sin(),
+        "beta_over_sine": beta / beta.sin(),
+    }
+    assert g.above_horizon.all()
+    for name, value in expected.items():
+        # 1 - cos^2 at 0.05 rad has lost 1/0.05^2 of its digits
+        assert_close(getattr(g, name), value, rtol=1e-13, atol=2e-15, msg=lambda m, name=name: f"{name}: {m}")
+
+
+def test_derived_quantities_are_computed_once():
+    g = Cosines.of(**up())
+    assert g.sin_alpha is g.sin_alpha
+
+
+def test_horizon_is_one_rounding_error(dtype):
+    eps = torch.finfo(dtype).eps
+    assert horizon(dtype) == eps
+    cosine = torch.tensor([-1.0, -eps, 0.0, eps, 2 * eps, 1.0], dtype=dtype)
+    one = torch.ones_like(cosine)
+    for light, view in ((cosine, one), (one, cosine)):
+        g = Cosines.from_products(light, view, 0.5 * one)
+        assert g.above_horizon.tolist() == [False, False, False, False, True, True]
+        below = ~g.above_horizon
+        for replaced in (g.light, g.view, g.phase):
+            assert (replaced[below] == 1).all()
+        assert g.zero_below_horizon(torch.ones(6, 2, dtype=dtype)).sum() == 4
+
+
+def test_from_products_broadcasts():
+    g = Cosines.from_products(torch.rand(4, 1), torch.rand(5), torch.tensor(0.5))
+    assert g.light.shape == g.view.shape == g.phase.shape == g.above_horizon.shape == (4, 5)
+
+
+def test_across_plane_is_never_negative(dtype):
+    # With light, view and normal in one plane it is 0 up to rounding of either sign, and multiplies tan(89 deg).
+    normal, light, _ = random_directions(2000, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    mirrored = 2 * (normal * light).sum(-1, keepdim=True) * normal - light
+    for view in (light, mirrored):
+        g = Cosines.of(*(v.to(dtype) for v in (normal, light, view)))
+        assert (g.across_plane >= 0).all()
+        assert (g.in_plane.abs() > g.sin_alpha * g.sin_beta).any()  # rounding did go below
+
+
+def test_normalize_takes_any_finite_length():
+    n = torch.tensor([0.0, 0.0, 1.0])
+    for length in (1e-30, 1e30):
+        found = Cosines.of(n, torch.tensor([0.6 * length, 0.0, 0.8 * length]), n, normalize=True)
+        torch.testing.assert_close(found.light.item(), 0.8, rtol=1e-6, atol=0)

@@ -1,0 +1,247 @@
+"""Material parameters: domains, storage, converters; and sums of models."""
+
+import math
+
+import pytest
+import torch
+from torch import nn
+from torch.testing import assert_close
+
+from torchbrdf import (
+    Interval,
+    Lambert,
+    OrenNayar,
+    QualitativeOrenNayar,
+    WeightedSum,
+    fixed,
+    sigma_from_beckmann_alpha,
+    sigma_from_degrees,
+    sigma_from_mean_slope,
+    trainable,
+)
+from torchbrdf.testing import TOLERANCE, random_directions
+
+UNIT, HALF_LINE = Interval(0.0, 1.0), Interval(0.5, math.inf)
+DOMAINS = {"albedo": (0.0, 1.0), "sigma": (0.0, math.pi / 2)}
+RULES = {
+    "albedo": r"OrenNayar.albedo must lie in [\[(]0, 1[\])]",
+    "sigma": r"OrenNayar.sigma must lie in [\[(]0, 1.571[\])] rad",
+}
+
+
+@pytest.mark.parametrize("name", DOMAINS)
+class TestDomain:
+    @pytest.mark.parametrize("wrap", [fixed, lambda value: value], ids=["fixed", "trained"])
+    @pytest.mark.parametrize("value", [-0.1, 1.6, math.nan, math.inf, -math.inf])
+    def test_outside_is_refused(self, name, value, wrap):
+        with pytest.raises(ValueError, match=rf"{RULES[name]}; 1 of 1 entries do not"):
+            OrenNayar(**{name: wrap(value)})
+
+    def test_refused_by_assignment_and_the_old_value_stays(self, name):
+        brdf = OrenNayar(**{name: 0.4})
+        with pytest.raises(ValueError, match=RULES[name]):
+            setattr(brdf, name, 7.0)
+        assert_close(getattr(brdf, name), torch.tensor(0.4))
+
+    @pytest.mark.parametrize("end", [0, 1])
+    def test_bound_is_for_fixed_only(self, name, end):
+        bound = DOMAINS[name][end]
+        with pytest.raises(ValueError, match=r"must lie in \(.*\).*hold it there with fixed\(...\)"):
+            OrenNayar(**{name: bound})
+        with pytest.raises(ValueError, match=r"hold it there with fixed"):
+            OrenNayar(**{name: torch.tensor(bound, dtype=torch.float64)})
+        held = OrenNayar(**{name: fixed(bound)})
+        assert_close(getattr(held, name), torch.tensor(bound), rtol=0, atol=0)
+
+    def test_bad_entries_are_counted_not_dumped(self, name):
+        values = torch.full((1000,), 0.5)
+        values[3], values[7], values[9] = -1.0, 2.0, math.nan
+        with pytest.raises(ValueError, match=r"3 of 1000 entries do not \(min -1, max 2\)") as caught:
+            OrenNayar(**{name: values})
+        assert len(str(caught.value)) < 200
+
+    def test_raw_is_stored_and_read_constrained(self, name):
+        brdf = OrenNayar(**{name: torch.tensor(0.4, dtype=torch.float64)})
+        low, high = DOMAINS[name]
+        raw = dict(brdf.named_parameters())[f"raw_{name}"]
+        assert_close(raw.item(), math.log(0.4 / (high - 0.4)), rtol=1e-14, atol=0)
+        for value in (-800.0, -5.0, 3.0, 800.0):
+            with torch.no_grad():
+                raw.fill_(value)
+            assert low <= getattr(brdf, name).item() <= high
+
+    def test_gradient_reaches_the_raw_parameter(self, name):
+        brdf = OrenNayar(**{name: torch.tensor(0.4, dtype=torch.float64)})
+        (slope,) = torch.autograd.grad(getattr(brdf, name), dict(brdf.named_parameters())[f"raw_{name}"])
+        high = DOMAINS[name][1]
+        assert_close(slope.item(), 0.4 * (1 - 0.4 / high), rtol=1e-14, atol=0)
+
+    def test_assignment_keeps_what_the_optimizer_holds(self, name):
+        brdf = OrenNayar(**{name: 0.4})
+        before = dict(brdf.named_parameters())[f"raw_{name}"]
+        setattr(brdf, name, torch.tensor(0.6))
+        assert dict(brdf.named_parameters())[f"raw_{name}"] is before
+        assert_close(getattr(brdf, name), torch.tensor(0.6))
+        setattr(brdf, name, torch.tensor([0.2, 0.3]))  # another shape needs another parameter
+        assert_close(getattr(brdf, name), torch.tensor([0.2, 0.3]))
+
+    def test_fixing_and_freeing(self, name):
+        brdf = OrenNayar(**{name: 0.4})
+        setattr(brdf, name, fixed(0.0))
+        assert f"raw_{name}" not in dict(brdf.named_parameters())
+        assert list(brdf.state_dict()).count(f"fixed_{name}") == 1
+        setattr(brdf, name, fixed(0.3))
+        assert_close(getattr(brdf, name), torch.tensor(0.3))
+        setattr(brdf, name, 0.5)
+        assert f"fixed_{name}" not in brdf.state_dict()
+        assert_close(getattr(brdf, name), torch.tensor(0.5))
+
+    def test_a_parameter_given_is_a_value(self, name):
+        given = nn.Parameter(torch.tensor(0.4))
+        brdf = OrenNayar(**{name: given})
+        assert set(dict(brdf.named_parameters())) == {"raw_albedo", "raw_sigma"}
+        assert_close(getattr(brdf, name), torch.tensor(0.4))
+
+    def test_fixed_does_not_alias_its_tensor(self, name):
+        given = torch.tensor([0.2, 0.4])
+        brdf = OrenNayar(**{name: fixed(given)})
+        given.fill_(0.9)
+        assert_close(getattr(brdf, name), torch.tensor([0.2, 0.4]))
+
+
+@pytest.mark.parametrize("build", [Lambert, QualitativeOrenNayar])
+def test_message_names_the_model(build):
+    with pytest.raises(ValueError, match=f"^{build.__name__}.albedo must lie in"):
+        build(albedo=2.0)
+
+
+def test_material_reads_back_what_was_given():
+    brdf = OrenNayar(albedo=torch.tensor([0.7, 0.2]), sigma=fixed(0.3))
+    assert list(brdf.material()) == ["albedo", "sigma"]
+    assert_close(brdf.material()["albedo"], torch.tensor([0.7, 0.2]))
+    assert_close(brdf.material()["sigma"], torch.tensor(0.3))
+
+
+@pytest.mark.parametrize(
+    ("domain", "value", "raw"),
+    [(UNIT, 0.5, 0.0), (UNIT, 0.9, math.log(9.0)), (HALF_LINE, 1.5, 0.0), (HALF_LINE, 0.5 + math.e, 1.0)],
+)
+def test_interval_coordinates(domain, value, raw):
+    value, raw = (torch.tensor(x, dtype=torch.float64) for x in (value, raw))
+    assert_close(domain.to_raw(value), raw)
+    assert_close(domain.from_raw(raw), value)
+
+
+def test_interval_messages():
+    with pytest.raises(ValueError, match=r"^x must lie in \[0.5, inf\); 1 of 2 entries do not \(min 0.1, max 3\).$"):
+        HALF_LINE.check("x", torch.tensor([0.1, 3.0]))
+    with pytest.raises(ValueError, match=r"^x must lie in \[0.5, inf\); 1 of 1 entries do not \(none is finite\)"):
+        HALF_LINE.check("x", torch.tensor(math.nan))
+    UNIT.check("x", torch.tensor([0.0, 1.0]))
+    with pytest.raises(ValueError, match=r"^x must lie in \(0, 1\); 2 of 2"):
+        UNIT.check("x", torch.tensor([0.0, 1.0]), open_ends=True)
+
+
+def test_trainable_lists_paths_and_domains():
+    brdf = 0.7 * OrenNayar(sigma=fixed(0.2)) + 0.3 * QualitativeOrenNayar()
+    found = trainable(brdf)
+    assert {name: raw for name, (raw, _) in found.items()} == {
+        "weights": "raw_weights",
+        "parts.0.albedo": "parts.0.raw_albedo",
+        "parts.1.albedo": "parts.1.raw_albedo",
+        "parts.1.sigma": "parts.1.raw_sigma",
+    }
+    domain = found["parts.1.sigma"][1]
+    assert (domain.low, domain.high, domain.unit) == (0.0, math.pi / 2, "rad")
+    assert set(dict(brdf.named_parameters())) == {raw for raw, _ in found.values()}
+    brdf.parts[1].requires_grad_(False)
+    assert "parts.1.sigma" not in trainable(brdf)
+
+
+def mean_slope(sigma):
+    """Mean of theta under exp(-theta^2/2 sigma^2) sin(theta), by the trapezoidal rule."""
+    theta = torch.linspace(0.0, math.pi / 2, 200_001, dtype=torch.float64)
+    weight = (-(theta**2) / (2 * sigma**2)).exp() * theta.sin()
+    return (theta * weight).sum().item() / weight.sum().item()
+
+
+def beckmann_mean_square_slope(alpha):
+    """Mean of tan(theta)^2 under Beckmann's exp(-tan^2/alpha^2)/cos^4, weighted by projected area cos."""
+    theta = torch.linspace(0.0, math.pi / 2, 200_001, dtype=torch.float64)[:-1]
+    tan2 = theta.tan() ** 2
+    weight = (-tan2 / alpha**2).exp() / theta.cos() ** 3 * theta.sin()
+    return (tan2 * weight).sum().item() / weight.sum().item()
+
+
+def test_converters():
+    assert_close(sigma_from_degrees(40.0), torch.tensor(math.radians(40)))
+    assert_close(sigma_from_degrees(torch.tensor([0.0, 90.0])), torch.tensor([0.0, math.pi / 2]))
+    # the Gaussian has mean square angle 2 sigma^2 for small sigma; each converter matches its moment to first order
+    alpha = 0.02
+    assert_close(2 * sigma_from_beckmann_alpha(alpha).item() ** 2, beckmann_mean_square_slope(alpha), rtol=1e-3, atol=0)
+    for sigma in (0.01, 0.05):
+        assert_close(sigma_from_mean_slope(mean_slope(sigma)).item(), sigma, rtol=1e-3, atol=0)
+
+
+@pytest.mark.parametrize("convert", [sigma_from_degrees, sigma_from_beckmann_alpha, sigma_from_mean_slope])
+def test_converters_keep_dtype(convert, dtype):
+    assert convert(torch.tensor(0.3, dtype=dtype)).dtype == dtype
+    assert convert(0.3).dtype == convert(1).dtype == torch.float32
+
+
+class TestWeightedSum:
+    @pytest.fixture
+    def directions(self):
+        return random_directions(50, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+
+    @pytest.fixture
+    def parts(self):
+        return OrenNayar(albedo=0.7, sigma=0.5).double(), Lambert(albedo=0.4).double()
+
+    def test_is_the_sum_of_its_parts(self, parts, directions):
+        a, b = parts
+        tight = {"rtol": TOLERANCE[torch.float64].rounding, "atol": 0.0}
+        expected = 0.7 * a(*directions) + 0.3 * b(*directions)
+        assert_close((0.7 * a + 0.3 * b)(*directions), expected, **tight)
+        assert_close((a * 0.7 + b * 0.3)(*directions), expected, **tight)
+        assert_close((a + b)(*directions), a(*directions) + b(*directions), **tight)
+        assert_close((2 * (0.7 * a + 0.3 * b) + a)(*directions), 2 * expected + a(*directions), **tight)
+        assert_close(WeightedSum(parts, [0.7, 0.3])(*directions), expected, **tight)
+
+    def test_weights_are_trainable(self, parts, directions):
+        brdf = 0.7 * parts[0] + 0.3 * parts[1]
+        raw = dict(brdf.named_parameters())["raw_weights"]
+        (slope,) = torch.autograd.grad(brdf(*directions).sum(), raw)
+        assert_close(slope, torch.stack([w * p(*directions).sum() for w, p in zip((0.7, 0.3), parts, strict=True)]))
+
+    def test_components_are_named_by_model(self, parts, directions):
+        brdf = 0.7 * parts[0] + 0.3 * parts[1] + 0.1 * parts[1]
+        got = brdf.components(*directions)
+        assert list(got) == ["OrenNayar.direct", "OrenNayar.interreflection", "Lambert.direct", "Lambert.direct#2"]
+        assert_close(got["Lambert.direct#2"], 0.1 * parts[1](*directions))
+
+    @pytest.mark.parametrize("weight", [0.0, -0.5, math.nan, math.inf])
+    def test_weight_that_is_not_positive_is_refused(self, parts, weight):
+        with pytest.raises(ValueError, match=r"WeightedSum.weights must lie in \(0, inf\)"):
+            weight * parts[0]
+        with pytest.raises(ValueError, match=r"WeightedSum.weights must lie in \(0, inf\); 1 of 2"):
+            WeightedSum(parts, [weight, 1.0])
+
+    def test_weights_follow_the_dtype_of_the_parts(self, parts):
+        assert (0.7 * parts[0]).weights.dtype == torch.float64
+        assert (0.7 * Lambert()).weights.dtype == torch.float32
+
+
+def test_half_precision_parameters_are_refused():
+    with pytest.raises(TypeError, match=r"OrenNayar.albedo must be float32 or float64; found torch.float16"):
+        OrenNayar(albedo=torch.tensor(0.5, dtype=torch.float16))
+
+
+def test_sums_refuse_what_does_not_add_up():
+    with pytest.raises(ValueError, match="found 1 parts and 2 weights"):
+        WeightedSum([Lambert()], [1.0, 2.0])
+    with pytest.raises(ValueError, match="at least one part"):
+        WeightedSum([], [])
+    with pytest.raises(TypeError, match="adds BRDFs; found int"):
+        Lambert() + 3  # pyright: ignore
+    assert len(sum([Lambert(), Lambert()]).parts) == 2  # pyright: ignore
