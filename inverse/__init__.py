@@ -1,0 +1,45 @@
+"""Recover the reflectance of a surface of known shape from photographs under known lights.
+
+The frame is x right, y up, z towards the camera. A scene says what was photographed; `render` shades
+it, its sensor takes the photograph, and `fit` finds the parameters of a BRDF that explain photographs.
+"""
+
+from inverse.bootstrap import bootstrap
+from inverse.fit import FitError, fit
+from inverse.geometry import Surface, cylinder, from_depth, from_normals, plane, revolution, sphere, vase
+from inverse.lights import Ambient, Distant
+from inverse.photos import Photographs, read_image, read_stack, usable, write_image, write_stack
+from inverse.profile import belly_row, cross_section, peak_position
+from inverse.result import FitResult
+from inverse.scene import Scene
+from inverse.sensor import Sensor
+from inverse.shading import render
+
+__all__ = [
+    "Ambient",
+    "Distant",
+    "FitError",
+    "FitResult",
+    "Photographs",
+    "Scene",
+    "Sensor",
+    "Surface",
+    "belly_row",
+    "bootstrap",
+    "cross_section",
+    "cylinder",
+    "fit",
+    "from_depth",
+    "from_normals",
+    "peak_position",
+    "plane",
+    "read_image",
+    "read_stack",
+    "render",
+    "revolution",
+    "sphere",
+    "usable",
+    "vase",
+    "write_image",
+    "write_stack",
+]

@@ -1,0 +1,106 @@
+"""What the camera would have recorded, as a function of the model's parameters.
+
+The part that does not depend on the parameters is done once: cosines for any model; for models
+linear in geometry images the images themselves, pixel-averaged and blurred, so that an evaluation
+is K multiply-adds a pixel.
+"""
+
+from collections.abc import Callable
+
+import torch
+from torch import Tensor, nn
+
+from inverse.lights import Distant, Light
+from inverse.scene import Scene
+from inverse.shading import cosines_to, shader, to_image
+from torchbrdf import BRDF, LinearBRDF
+
+Predict = Callable[[dict[str, Tensor]], Tensor]
+
+
+class _Call(nn.Module):
+    """Lets torch.func.functional_call reach something else than `forward`."""
+
+    def __init__(self, model: BRDF, compute: Callable[[BRDF], Tensor]):
+        super().__init__()
+        self.model = model
+        self.compute = compute
+
+    def forward(self) -> Tensor:
+        return self.compute(self.model)
+
+
+def predictor(scene: Scene, model: BRDF, pixels: Tensor, *, per_texel: bool) -> Predict:
+    """Function from raw parameters (as in `model.named_parameters()`) to recorded values.
+
+    Args:
+        pixels: which pixels to predict, (rows, columns) bool with P true.
+        per_texel: some parameters have one entry for each masked point. They cannot be mixed
+            between pixels, so the surface must have one sample a pixel and the sensor no blur.
+    Returns: function whose value is (image, P, channel), in the sensor's digital values.
+    """
+    if per_texel and (scene.surface.samples > 1 or scene.sensor.psf_sigma > 0):
+        raise ValueError(
+            "per-texel parameters need a surface with samples=1 and a sensor with psf_sigma=0; "
+            f"found samples={scene.surface.samples}, psf_sigma={scene.sensor.psf_sigma} pixel."
+        )
+    distant = all(isinstance(light, Distant) for lights in scene.lights for light in lights)
+    if isinstance(model, LinearBRDF) and distant:
+        compute = _linear(scene, model, pixels)
+    else:
+        compute = _general(scene, pixels)
+    call = _Call(model, compute)
+
+    def predict(raw: dict[str, Tensor]) -> Tensor:
+        return torch.func.functional_call(call, {f"model.{name}": value for name, value in raw.items()}, ())
+
+    return predict
+
+
+def _recorded(scene: Scene, values: Tensor, pixels: Tensor) -> Tensor:
+    """Values (point, channel) at masked points -> recorded at `pixels` (P, channel)."""
+    if scene.surface.samples == 1 and scene.sensor.psf_sigma == 0:
+        return values[pixels[scene.surface.mask]] * scene.sensor.exposure
+    return scene.sensor.focus(to_image(values, scene.surface))[pixels] * scene.sensor.exposure
+
+
+def _linear(scene: Scene, model: LinearBRDF, pixels: Tensor) -> Callable[[BRDF], Tensor]:
+    with torch.no_grad():
+        images = []
+        for lights in scene.lights:
+            first, *others = (_lit_basis(scene, model, light) for light in lights)
+            total = sum(others, first)  # (point, 1 or channel, K)
+            images.append(_recorded(scene, total.flatten(1), pixels).unflatten(1, total.shape[1:]))
+    basis = torch.stack(torch.broadcast_tensors(*images))  # (image, P, 1 or channel, K)
+    inside = pixels[scene.surface.mask] if scene.surface.samples == 1 else None
+
+    def compute(model: BRDF) -> Tensor:
+        assert isinstance(model, LinearBRDF)
+        coefficients = model.coefficients()  # (channel, K), or (masked point, channel, K) if per texel
+        if coefficients.ndim > 2 and inside is not None:
+            coefficients = coefficients[inside]
+        return (basis * coefficients).sum(-1)
+
+    return compute
+
+
+def _lit_basis(scene: Scene, model: LinearBRDF, light: Light) -> Tensor:
+    """The model's geometry images times cosine and irradiance (point, 1 or channel, K)."""
+    assert isinstance(light, Distant)
+    cosines = cosines_to(light, scene.surface)
+    irradiance = torch.atleast_1d(torch.as_tensor(light.irradiance)).to(cosines.light)
+    return (cosines.light[:, None] * irradiance)[..., None] * model.basis(cosines)[:, None, :]
+
+
+def _general(scene: Scene, pixels: Tensor) -> Callable[[BRDF], Tensor]:
+    with torch.no_grad():
+        shaders = [[shader(scene.surface, light) for light in lights] for lights in scene.lights]
+
+    def compute(model: BRDF) -> Tensor:
+        images = []
+        for parts in shaders:
+            first, *others = (shade(model) for shade in parts)
+            images.append(_recorded(scene, sum(others, first), pixels))
+        return torch.stack(images)
+
+    return compute

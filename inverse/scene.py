@@ -1,0 +1,36 @@
+"""What was photographed, and what is known of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from inverse.geometry import Surface
+from inverse.lights import Ambient, Distant, Light
+from inverse.sensor import Sensor
+
+
+@dataclass(frozen=True, init=False)
+class Scene:
+    """A surface, one set of lights an image, and the camera that took the images.
+
+    Attributes:
+        surface: known geometry.
+        lights: for each image its lights; on construction a single light may stand for a set of one.
+        sensor: the fit uses its exposure and point-spread function.
+    Raises: ValueError when there is no image.
+    """
+
+    surface: Surface
+    lights: tuple[tuple[Light, ...], ...]
+    sensor: Sensor
+
+    def __init__(self, surface: Surface, lights: Sequence[Light | Sequence[Light]], sensor: Sensor | None = None):
+        sets = tuple((entry,) if isinstance(entry, Distant | Ambient) else tuple(entry) for entry in lights)
+        if not sets or not all(sets):
+            raise ValueError("Scene.lights must hold at least one image and one light for each; found none.")
+        for name, value in (("surface", surface), ("lights", sets), ("sensor", sensor or Sensor())):
+            object.__setattr__(self, name, value)
+
+    @property
+    def images(self) -> int:
+        """Number of images."""
+        return len(self.lights)

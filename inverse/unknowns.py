@@ -1,0 +1,113 @@
+"""The unknowns of a fit as vectors: shared ones, and those with a value for every pixel."""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from torchbrdf import BRDF, Interval, trainable
+
+_EXPOSURE = Interval(0.0, torch.inf)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """One trained parameter of the model, or a nuisance of the photographs."""
+
+    name: str
+    raw_name: str
+    domain: Interval | None
+    start: Tensor
+    per_texel: bool
+
+    def physical(self, raw: Tensor) -> Tensor:
+        """Value in its own unit from the unconstrained coordinate."""
+        return raw if self.domain is None else self.domain.from_raw(raw)
+
+    def slope(self, raw: Tensor) -> Tensor:
+        """d physical / d raw."""
+        return torch.func.jvp(self.physical, (raw,), (torch.ones_like(raw),))[1]
+
+    def physical_error(self, raw: Tensor, raw_error: Tensor) -> Tensor:
+        """Error of the value from that of its coordinate; infinite on a bound, and where it exceeds the domain."""
+        slope = self.slope(raw)
+        error = slope * raw_error.to(raw.dtype)
+        width = torch.inf if self.domain is None else self.domain.high - self.domain.low
+        return torch.where((slope > 0) & (error <= width), error, torch.inf)
+
+    def labels(self) -> list[str]:
+        """A name for each entry of a shared unknown."""
+        if self.start.numel() == 1:
+            return [self.name]
+        return [f"{self.name}[{k}]" for k in range(self.start.numel())]
+
+
+class Unknowns:
+    """Packs the raw values into `shared` (G,) and `own` (P, L), and back.
+
+    Args:
+        model: whose trainable parameters are fitted.
+        texels: for each used pixel, its position among the masked points (P,).
+        points: number of masked points; a parameter whose first dimension is that number is per texel.
+        images: number of images; exposure is relative to the first image's.
+    """
+
+    def __init__(
+        self, model: BRDF, texels: Tensor, points: int, images: int, *, free_exposure: bool, free_ambient: bool
+    ):
+        raw = dict(model.named_parameters())
+        self.entries = []
+        for name, (raw_name, domain) in trainable(model).items():
+            start = raw[raw_name].detach()
+            per_texel = start.ndim > 0 and start.shape[0] == points > 1
+            self.entries.append(Unknown(name, raw_name, domain, start, per_texel))
+        blank = texels.new_zeros(images, dtype=self.entries[0].start.dtype if self.entries else torch.float32)
+        if free_exposure:
+            self.entries.append(Unknown("exposure", "", _EXPOSURE, blank[1:], False))
+        if free_ambient:
+            self.entries.append(Unknown("ambient", "", None, blank, False))
+        if not any(entry.start.numel() for entry in self.entries):
+            raise ValueError(f"{type(model).__name__} has nothing to fit: every parameter is fixed.")
+        self.blank, self.texels = blank, texels
+        self.shared_entries = [entry for entry in self.entries if not entry.per_texel]
+        self.own_entries = [entry for entry in self.entries if entry.per_texel]
+
+    def pack(self) -> tuple[Tensor, Tensor]:
+        """Start values: shared (G,) and own (P, L)."""
+        shared = [entry.start.flatten() for entry in self.shared_entries]
+        own = [entry.start[self.texels].flatten(1) if entry.start.ndim > 1 else entry.start[self.texels, None]
+               for entry in self.own_entries]  # fmt: skip
+        return (
+            torch.cat(shared) if shared else self.blank.new_zeros(0),
+            torch.cat(own, 1) if own else self.blank.new_zeros(len(self.texels), 0),
+        )
+
+    def unpack(self, shared: Tensor, own: Tensor) -> tuple[dict[str, Tensor], Tensor, Tensor]:
+        """Raw parameters of the model by name, exposure (image,) relative to the first, ambient (image,)."""
+        raw: dict[str, Tensor] = {}
+        exposure, ambient = torch.ones_like(self.blank), self.blank
+        for entry, value in self.split_shared(shared):
+            if entry.name == "exposure":
+                exposure = torch.cat((torch.ones_like(value[:1].sum(0, keepdim=True)), entry.physical(value)))
+            elif entry.name == "ambient":
+                ambient = value
+            else:
+                raw[entry.raw_name] = value.reshape(entry.start.shape)
+        for entry, value in self.split_own(own):
+            raw[entry.raw_name] = entry.start.index_copy(0, self.texels, value.reshape(-1, *entry.start.shape[1:]))
+        return raw, exposure, ambient
+
+    def split_shared(self, shared: Tensor) -> list[tuple[Unknown, Tensor]]:
+        """The piece of a shared vector (G,) that belongs to each shared unknown."""
+        pieces = shared.split([entry.start.numel() for entry in self.shared_entries]) if self.shared_entries else []
+        return list(zip(self.shared_entries, pieces, strict=True))
+
+    def split_own(self, own: Tensor) -> list[tuple[Unknown, Tensor]]:
+        """The columns of an own matrix (P, L) that belong to each per-texel unknown."""
+        widths = [entry.start[0].numel() for entry in self.own_entries]
+        return list(zip(self.own_entries, own.split(widths, 1) if widths else [], strict=True))
+
+    def shared_labels(self) -> list[str]:
+        """Names of the entries of the shared vector; exposures count from the second image."""
+        labels = [label for entry in self.shared_entries for label in entry.labels()]
+        return [f"exposure[{int(x[9:-1]) + 1}]" if x.startswith("exposure[") else x for x in labels]
