@@ -38,7 +38,7 @@ def main() -> None:
             optimizer.step(loss)
         sigma = torch.rad2deg(model.sigma).item()
         albedo = ", ".join(f"{rho:.4f}" for rho in model.albedo.tolist())
-        print(f"{optimizer_class.__name__:<6} sigma {sigma:.3f} deg (truth 40), albedo {albedo} (truth 0.75, 0.55, 0.4)")
+        print(f"{optimizer_class.__name__:<6} sigma {sigma:.3f} deg (truth 40), albedo {albedo} (0.75, 0.55, 0.4)")
 
 
 if __name__ == "__main__":

@@ -1,14 +1,18 @@
 """Figures. Needs matplotlib (the `plots` extra)."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
 import matplotlib.pyplot as plt
+import torch
 from torch import Tensor
 
-from inverse.geometry import Surface
+from inverse.geometry import Surface, pixel_average
+from inverse.lights import Distant
 from inverse.profile import cross_section
+from inverse.scene import Scene
 
 matplotlib.use("Agg")  # files only: no display is needed
 
@@ -49,6 +53,54 @@ def fit_figure(
         axis.set_title(f"({'ab'[k]}) cross-section of the belly, {lights[k]}", fontsize=10)
     figure.savefig(path, dpi=100)
     plt.close(figure)
+
+
+def residual_figure(
+    path: Path | str, scene: Scene, photographs: Tensor, renderings: dict[str, Tensor], valid: Tensor
+) -> None:
+    """What each model leaves unexplained: in one image, and over all images against the angle of the light.
+
+    Args:
+        photographs: (image, rows, columns, channel).
+        renderings: label -> images of the same shape, in the same units.
+        valid: the samples that were fitted, bool (image, rows, columns); the others are left white.
+    """
+    figure, axes = plt.subplots(
+        1, len(renderings) + 2, figsize=(3.2 * (len(renderings) + 2), 3.2), layout="constrained"
+    )
+    axes[0].imshow(photographs[0].mean(-1).numpy(), cmap="gray")
+    axes[0].set_title("photograph 0", fontsize=10)
+    limit = 3 * (photographs - next(iter(renderings.values())))[valid].std().item()
+    angles = torch.stack([_light_angle(scene, k) for k in range(scene.images)])
+    edges = torch.linspace(0, 75, 16)
+    for axis, colour, (label, stack) in zip(axes[1:], _LINES, renderings.items(), strict=False):
+        residual = (photographs - stack).mean(-1)
+        shown = residual[0].masked_fill(~valid[0], torch.nan)
+        picture = axis.imshow(shown.numpy(), cmap="RdBu_r", vmin=-limit, vmax=limit)
+        rms = residual[valid].square().mean().sqrt().item()
+        axis.set_title(f"minus {label}, rms {rms:.4f}", fontsize=10)
+        means = [
+            residual[valid & (angles >= low) & (angles < high)].mean().item()
+            for low, high in pairwise(edges)
+        ]
+        axes[-1].plot((edges[:-1] + edges[1:]) / 2, means, ".-", color=colour, label=label)
+    figure.colorbar(picture, ax=axes[len(renderings)], shrink=0.8)
+    for axis in axes[:-1]:
+        axis.set_axis_off()
+    axes[-1].set(xlabel="angle of the light [deg]", title="mean residual, all images")
+    axes[-1].title.set_fontsize(10)
+    axes[-1].axhline(0, color="k", linewidth=0.5)
+    axes[-1].legend(fontsize=8)
+    figure.savefig(path, dpi=100)
+    plt.close(figure)
+
+
+def _light_angle(scene: Scene, image: int) -> Tensor:
+    """Polar angle of an image's first light at each pixel (rows, columns). [deg]"""
+    light = scene.lights[image][0]
+    assert isinstance(light, Distant)
+    normals = pixel_average(scene.surface.normals, scene.surface.samples)
+    return torch.rad2deg((normals @ light.direction.to(normals)).clamp(-1, 1).acos())
 
 
 def _plot_cross_section(axis, surface: Surface, photograph: Tensor, renderings: dict[str, Tensor]) -> None:

@@ -83,7 +83,7 @@ def _estimate(value: Tensor, error: Tensor, unit: str) -> str:
     if value.numel() > 8:
         known = error[error.isfinite()]
         typical = f"{known.median():.2g}" if known.numel() else "unknown"
-        return f"{value.numel()} values, median {value.median():.4g}, median error {typical}{suffix}"
+        return f"{value.numel()} values, median {value.nanmedian():.4g}, median error {typical}{suffix}"
     pairs = zip(value.flatten().tolist(), error.flatten().tolist(), strict=True)
     return ", ".join(_plus_minus(v, e) + suffix for v, e in pairs)
 
