@@ -1,0 +1,62 @@
+"""The examples run at reduced size and print what they promise."""
+
+import re
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    def run_example(name, *arguments):
+        monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
+        runpy.run_path(str(EXAMPLES / name), run_name="__main__")
+        return capsys.readouterr().out
+
+    return run_example
+
+
+def numbers(line):
+    return [float(k) for k in re.findall(r"[-+]?\d+\.\d+", line)]
+
+
+def test_first_steps(run):
+    printed = run("00_first_steps.py")
+    for name in ("Adam", "LBFGS"):
+        (line,) = (line for line in printed.splitlines() if line.startswith(name))
+        assert numbers(line)[0] == pytest.approx(40, abs=0.02)
+
+
+def test_vase_fit_recovers_the_clay_and_lambert_fails_as_the_paper_says(run, tmp_path):
+    printed = run("01_fit_vase.py", "--size", 128, "--output", tmp_path).splitlines()
+    sigma, sigma_error, albedo, albedo_error, *_ = numbers(next(x for x in printed if x.startswith("OrenNayar")))
+    assert abs(sigma - 40) < 4 * sigma_error
+    assert abs(albedo - 0.7) < 4 * albedo_error
+    assert sigma_error < 0.2
+    straight, oblique = (k for k, line in enumerate(printed) if line.startswith("  light"))
+    limb = {line.split()[0]: numbers(line) for line in printed[straight + 1 : straight + 3]}
+    # the numbers of a line: displacement, -0.9, brightness there, +0.9, brightness there, rms
+    assert limb["Lambert"][2] < 0.5 < 0.75 < limb["OrenNayar"][2]
+    displaced = {line.split()[0]: numbers(line)[0] for line in printed[oblique + 1 : oblique + 3]}
+    assert displaced["Lambert"] < -0.2
+    assert abs(displaced["OrenNayar"]) < 0.1
+    with Image.open(tmp_path / "vase_fit.png") as figure:
+        assert figure.size[0] > 1000
+
+
+def test_photographs_are_written_read_and_fitted(run, tmp_path):
+    printed = run("02_fit_photographs.py", "--synthetic", "--size", 48, "--refits", 3, "--output", tmp_path)
+    line = next(x for x in printed.splitlines() if x.startswith("sigma") and "deg" in x)
+    assert numbers(line)[0] == pytest.approx(15, abs=3)
+    assert (tmp_path / "photographs_fit.png").exists()
+
+
+def test_benchmark_compares_with_lambert(run):
+    printed = run("bench_models.py", "--points", 1000, "--repeats", 1, "--no-compile")
+    assert "Lambert" in printed
+    assert "1.00 x" in printed
