@@ -7,7 +7,6 @@ import time
 import torch
 from torch import Tensor
 
-from inverse.geometry import pixel_average
 from inverse.identifiability import Covariance, judge
 from inverse.levenberg import Solution, minimise
 from inverse.prediction import predictor
@@ -72,7 +71,7 @@ def fit(
     model = copy.deepcopy(model).to(dtype)
     pixels = valid.any(0)
     measured, used = photographs[:, pixels], valid[:, pixels, None].to(dtype)
-    texels = pixels[_object(scene)].nonzero()[:, 0]
+    texels = pixels[scene.surface.coverage() == 1].nonzero()[:, 0]
     unknowns = Unknowns(
         model, texels, int(scene.surface.mask.sum()), scene.images,
         free_exposure=free_exposure, free_ambient=free_ambient,
@@ -113,7 +112,7 @@ def checked(scene: Scene, photographs: Tensor) -> Tensor:
 
 def usable_samples(scene: Scene, photographs: Tensor, valid: Tensor | None) -> Tensor:
     """Samples the fit uses (image, rows, columns): covered, allowed by `valid`, not saturated."""
-    allowed = _object(scene).expand(photographs.shape[:3])
+    allowed = (scene.surface.coverage() == 1).expand(photographs.shape[:3])
     if valid is not None:
         if valid.shape != photographs.shape[:3] or valid.dtype != torch.bool:
             raise ValueError(
@@ -136,24 +135,15 @@ def usable_samples(scene: Scene, photographs: Tensor, valid: Tensor | None) -> T
     return allowed & unsaturated
 
 
-def _object(scene: Scene) -> Tensor:
-    """Pixels that the object covers fully (rows, columns)."""
-    surface = scene.surface
-    if surface.samples == 1:
-        return surface.mask
-    share = pixel_average(surface.mask[..., None].double(), surface.samples)[..., 0]
-    return share == 1
-
-
-def _starts(unknowns: Unknowns, own_start: Tensor, count: int, seed: int) -> list[Tensor]:
+def _starts(unknowns: Unknowns, first: Tensor, count: int, seed: int) -> list[Tensor]:
     """The model's own start and count - 1 random ones, spread over the finite domains."""
     if count < 1:
         raise ValueError(f"starts must be at least 1; found {count}.")
     generator = torch.Generator().manual_seed(seed)
-    found = [own_start]
+    found = [first]
     for _ in range(count - 1):
         pieces = []
-        for entry, raw in unknowns.split_shared(own_start):
+        for entry, raw in unknowns.split_shared(first):
             finite = entry.domain is not None and math.isfinite(entry.domain.high)
             drawn = 0.05 + 0.9 * torch.rand(raw.shape, generator=generator, dtype=raw.dtype)
             pieces.append(torch.logit(drawn) if finite else raw)
