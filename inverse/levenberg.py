@@ -14,6 +14,8 @@ from tqdm import tqdm
 
 # Steps below this, in the unconstrained coordinates, change nothing that can be seen.
 STEP_TOLERANCE = {torch.float64: 1e-10, torch.float32: 1e-5}
+# Neither does a relative decrease of the sum of squares below this.
+COST_TOLERANCE = {torch.float64: 1e-12, torch.float32: 1e-7}
 # A longer step could leap onto the flat end of a parameter's domain, where its derivative is lost.
 _LONGEST_STEP = 2.0
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-12, 1e12
@@ -143,7 +145,7 @@ def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int)
             length = max((d.abs().max().item() for d in (d_shared, d_own) if d.numel()), default=0.0)
             new_shared, new_own = found.shared + d_shared.to(dtype), found.own + d_own.to(dtype)
             cost = residual(new_shared, new_own).double().square().sum().item()
-            negligible = length < STEP_TOLERANCE[dtype] or decrease <= torch.finfo(dtype).eps * found.equations.cost
+            negligible = length < STEP_TOLERANCE[dtype] or decrease <= COST_TOLERANCE[dtype] * found.equations.cost
             if cost <= found.equations.cost or negligible or damping > _MOST_DAMPING:
                 break
             damping *= 4

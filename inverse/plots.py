@@ -78,12 +78,12 @@ def residual_figure(
     for axis, colour, (label, stack) in zip(axes[1:], _LINES, renderings.items(), strict=False):
         residual = (photographs - stack).mean(-1)
         shown = residual[0].masked_fill(~valid[0], torch.nan)[window]
-        picture = axis.imshow(shown.numpy(), cmap="RdBu_r", vmin=-limit, vmax=limit)
+        axis.imshow(shown.numpy(), cmap="RdBu_r", vmin=-limit, vmax=limit)
         rms = residual[valid].square().mean().sqrt().item()
         axis.set_title(f"minus {label}, rms {rms:.4f}", fontsize=10)
         means = [residual[valid & (angles >= low) & (angles < high)].mean().item() for low, high in pairwise(edges)]
         axes[-1].plot((edges[:-1] + edges[1:]) / 2, means, ".-", color=colour, label=label)
-    figure.colorbar(picture, ax=axes[len(renderings)], shrink=0.8)
+    figure.colorbar(axes[1].images[0], ax=axes[len(renderings)], shrink=0.8)
     for axis in axes[:-1]:
         axis.set_axis_off()
     axes[-1].set(xlabel="angle of the light [deg]", title="mean residual, all images")

@@ -41,7 +41,8 @@ def test_vase_fit_recovers_the_clay_and_lambert_fails_as_the_paper_says(run, tmp
     straight, oblique = (k for k, line in enumerate(printed) if line.startswith("  light"))
     limb = {line.split()[0]: numbers(line) for line in printed[straight + 1 : straight + 3]}
     # the numbers of a line: displacement, -0.9, brightness there, +0.9, brightness there, rms
-    assert limb["Lambert"][2] < 0.5 < 0.75 < limb["OrenNayar"][2]
+    assert limb["Lambert"][2] < 0.5
+    assert limb["OrenNayar"][2] > 0.75
     displaced = {line.split()[0]: numbers(line)[0] for line in printed[oblique + 1 : oblique + 3]}
     assert displaced["Lambert"] < -0.2
     assert abs(displaced["OrenNayar"]) < 0.1

@@ -284,5 +284,7 @@ def test_bootstrap_sees_a_light_that_is_wrong():
     found = fit(believed, photographs, OrenNayar())
     spread = bootstrap(believed, photographs, OrenNayar(), samples=20)
     assert spread["sigma"] > 2 * found.standard_error["sigma"]
-    with pytest.raises(ValueError, match="at least 2"):
+    with pytest.raises(ValueError, match="at least 2 samples"):
         bootstrap(believed, photographs, OrenNayar(), samples=1)
+    with pytest.raises(ValueError, match="at least 3; found 2"):
+        bootstrap(Scene(surface, believed.lights[:2]), photographs[:2], OrenNayar(), samples=3)
