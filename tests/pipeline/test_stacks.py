@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 from PIL import Image
+from png_files import png_bytes
 
 from inverse.geometry import sphere, vase
 from inverse.lights import Ambient, Distant
