@@ -34,6 +34,8 @@ def bootstrap(
         valid: as in `fit`; it is resampled with the images.
         options: further arguments of `fit`.
     Returns: by parameter name, in the parameter's unit. A parameter that a fit gives per texel is left out.
+    Raises: ValueError for too few samples or images, and when fewer than half of the refits determined
+        the parameters; the others are left out.
     """
     if samples < 2:
         raise ValueError(f"bootstrap needs at least 2 samples; found {samples}.")
@@ -41,14 +43,22 @@ def bootstrap(
         raise ValueError(f"bootstrap resamples images and needs at least {_FEWEST_IMAGES}; found {scene.images}.")
     generator = torch.Generator().manual_seed(seed)
     found: dict[str, list[Tensor]] = {}
+    refused: list[str] = []
+    used = 0
     for _ in tqdm(range(samples), desc="bootstrap", leave=False, disable=None):
         drawn = torch.zeros(scene.images, dtype=torch.long)
         while len(drawn.unique()) < 2:  # one image over and over would say what that image says
             drawn = torch.randint(scene.images, (scene.images,), generator=generator)
         again = Scene(scene.surface, [scene.lights[k] for k in drawn.tolist()], scene.sensor)
         kept = None if valid is None else valid[drawn]
-        result = fit(again, photographs[drawn], model, valid=kept, **options)
+        result = fit(again, photographs[drawn], model, valid=kept, **options | {"throw": False})
+        if result.status not in ("converged", "at bound"):
+            refused.append(f"{result.status}: {result.reason}")
+            continue
+        used += 1
         shared = {label.split("[")[0] for label in result.names} - {"exposure", "ambient"}
         for name in shared:
             found.setdefault(name, []).append(result.parameters[name])
+    if used < max(2, samples / 2):
+        raise ValueError(f"only {used} of {samples} bootstrap refits determined the parameters; {refused[0]}.")
     return {name: torch.stack(values).std(0) for name, values in found.items()}

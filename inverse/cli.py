@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from inverse.bootstrap import bootstrap
-from inverse.fit import fit
+from inverse.fit import FitError, fit
 from inverse.geometry import cylinder, plane, sphere, vase
 from inverse.lights import Distant
 from inverse.photos import read_stack, usable, write_stack
@@ -30,7 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         report = options.run(options)
-    except (ValueError, OSError, RuntimeError) as error:  # RuntimeError: a fit of the bootstrap diverged
+    except (ValueError, OSError, FitError) as error:
         print("error:", " ".join(str(error).split()), file=sys.stderr)
         return 2
     print(json.dumps(report, indent=2, allow_nan=False) if options.json else report["table"])
@@ -110,7 +110,7 @@ def _fit(options: argparse.Namespace) -> dict[str, Any]:
     model = _model(options.model, start, torch.tensor(0.3, dtype=torch.float64))
     how = {
         "valid": valid, "free_exposure": options.free_exposure, "free_ambient": options.free_ambient,
-        "starts": options.starts, "throw": False,
+        "starts": options.starts,
     }  # fmt: skip
     result = fit(scene, photos.images, model, seed=options.seed, **how)
     report = {"images": list(photos.names), **result.to_json()}

@@ -2,7 +2,7 @@
 
 A folder holds one stack: one camera that did not move, one distant light an image. Text after # is ignored.
 
-    *.png *.tga *.tif *.tiff   images in natural order (2 before 10), 8 or 16 bits, grey or RGB; alpha is not read
+    *.png *.tga *.tif *.tiff   images in natural order (2 before 10), 8 or 16 bits, grey or RGB (8-bit alpha is ignored)
     *mask*                     image; the object is where it exceeds half of full scale. Optional
     lights.txt                 a line an image: x y z, a unit vector towards the light, then its irradiance if not 1;
                                the number of lights may stand on a line before them

@@ -121,6 +121,8 @@ class LinearBRDF(BRDF):
 class WeightedSum(BRDF):
     """Sum of BRDFs with trainable positive weights (part,). Components are named `Model.part`.
 
+    A weight and the albedo of its part say the same thing: hold one of them `fixed` before fitting. The
+    weights of a sum made by + and * are trainable; assign `sum.weights = fixed(...)` to hold them.
     Whether the sum reflects more than it receives is the weights' business: nothing bounds their sum.
     Raises ValueError for a weight that is not positive and finite, or counts that differ; TypeError
     for parts that are not BRDFs.
@@ -151,14 +153,14 @@ class WeightedSum(BRDF):
         return found
 
     def __mul__(self, weight: Tensor | float) -> "WeightedSum":
-        return WeightedSum(list(self.parts), self.weights * weight)  # pyright: ignore[reportArgumentType]
+        return WeightedSum(list(self.parts), self.weights.detach() * weight)  # pyright: ignore[reportArgumentType]
 
     __rmul__ = __mul__
 
     def __add__(self, other: BRDF) -> "WeightedSum":
-        parts, weights = [*self.parts], [*self.weights]
+        parts, weights = [*self.parts], [*self.weights.detach()]
         if isinstance(other, WeightedSum):
-            return WeightedSum([*parts, *other.parts], [*weights, *other.weights])  # pyright: ignore
+            return WeightedSum([*parts, *other.parts], [*weights, *other.weights.detach()])  # pyright: ignore
         return WeightedSum([*parts, other], [*weights, 1.0])  # pyright: ignore[reportArgumentType]
 
 

@@ -17,18 +17,23 @@ class Interval:
 
     `unit` is "rad", or "" for a pure number. `even` says that reflectance depends on the square of the
     parameter near low = 0, so that its derivative vanishes there: sigma is told from 0 through sigma^2.
+    `trailing` axes of the parameter are its own (channel, part); axes before them are pixels.
 
     The closed interval is what a formula accepts. A trained value lives in the open one, through a
-    logistic map (an exponential where high is infinite): it can approach a bound and never sit on it.
+    logistic map (an exponential where high is infinite): it approaches a bound until rounding sees no
+    difference, and its derivative fades on the way.
     """
 
     low: float
     high: float
     unit: str = ""
     even: bool = False
+    trailing: int = 0
 
     def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
         """Raise ValueError unless every entry lies in the domain (strictly inside if `open_ends`)."""
+        if not isinstance(value, Tensor):
+            raise TypeError(f"{name} must be a torch.Tensor; found {type(value).__name__}.")
         inside = (value > self.low) & (value < self.high) if open_ends else (value >= self.low) & (value <= self.high)
         if holds(inside):
             return
@@ -57,9 +62,9 @@ class Interval:
         return (self.low + inside).reshape(raw.shape)
 
 
-ALBEDO = Interval(0.0, 1.0)
+ALBEDO = Interval(0.0, 1.0, trailing=1)
 ROUGHNESS = Interval(0.0, math.pi / 2, "rad", even=True)
-WEIGHT = Interval(0.0, math.inf)
+WEIGHT = Interval(0.0, math.inf, trailing=1)
 
 
 @dataclass(frozen=True)
@@ -95,8 +100,14 @@ class Constrained:
 
     def __set__(self, module: nn.Module, value: "Tensor | float | fixed") -> None:
         held = isinstance(value, fixed)
-        tensor = _as_float_tensor(value.value if held else value)
         name = f"{type(module).__name__}.{self.name}"
+        given = value.value if held else value
+        if isinstance(given, Tensor) and given.grad_fn is not None:
+            raise ValueError(
+                f"{name} is the result of a computation, and a module keeps a parameter of its own: its gradient would "
+                "be lost. Pass .detach(), or differentiate through the model's function or torch.func.functional_call."
+            )
+        tensor = _as_float_tensor(given)
         if tensor.dtype not in SUPPORTED_DTYPES:
             raise TypeError(f"{name} must be float32 or float64; found {tensor.dtype}.")
         self.domain.check(name, tensor, open_ends=not held)
@@ -136,6 +147,15 @@ def trainable(module: nn.Module) -> dict[str, tuple[str, Interval]]:
             if raw is not None and raw.requires_grad:
                 found[dot + entry.name] = (f"{dot}raw_{entry.name}", entry.domain)
     return found
+
+
+def is_per_texel(module: nn.Module) -> bool:
+    """Whether any parameter has one entry for each pixel."""
+    return any(
+        getattr(child, entry.name).ndim > entry.domain.trailing
+        for child in module.modules()
+        for entry in declared(child)
+    )
 
 
 def sigma_from_degrees(degrees: Tensor | float) -> Tensor:

@@ -118,7 +118,7 @@ def test_render_repeats_with_the_seed(tmp_path):
         (["fit", "FOLDER", "--lights", "absent.txt"], "absent.txt"),
         (["fit", "FOLDER", "--limb", "100"], "limb 100"),
         (["fit", "FOLDER", "--exposure", "0"], "Sensor.exposure must be positive"),
-        (["fit", "FOLDER", "--starts", "0"], "starts must be at least 1"),
+        (["fit", "FOLDER", "--starts", "0"], "starts must be a whole number of at least 1"),
         (["fit", "FOLDER", "--bootstrap", "1"], "at least 2"),
         (["fit", "FOLDER", "--bootstrap", "-3"], "at least 2"),
         (["render", "--output", "NEW", "--sigma", "200"], "sigma must lie in"),

@@ -257,7 +257,7 @@ def test_bad_masks_and_settings_are_named():
         fit(SCENE, GOOD, Lambert(), valid=nothing[:1])
     with pytest.raises(ValueError, match="nothing to fit"):
         fit(SCENE, GOOD, Lambert(albedo=fixed(0.5)))
-    with pytest.raises(ValueError, match="starts must be at least 1"):
+    with pytest.raises(ValueError, match="starts must be a whole number of at least 1"):
         fit(SCENE, GOOD, Lambert(), starts=0)
     with pytest.raises(ValueError, match="mask is empty"):
         Surface(GOOD[0].expand(16, 16, 3), GOOD[0].expand(16, 16, 3), nothing[0], torch.tensor([0.0, 0.0, 1.0]))

@@ -235,14 +235,17 @@ def test_normal_map_is_scaled_and_masked():
 @pytest.mark.parametrize(
     ("make_bad", "message"),
     [
-        (lambda: from_normals(torch.zeros(3, 4)), r"normals must have shape \(rows, columns, 3\); found \(3, 4\)"),
+        (
+            lambda: from_normals(torch.zeros(3, 4)),
+            r"normals must be floating-point of shape \(rows, columns, 3\); found torch.float32 \(3, 4\)",
+        ),
         (lambda: from_normals(torch.zeros(3, 4, 3)), "mask is empty"),
         (lambda: from_depth(torch.zeros(3, 4, 1)), r"depth must have shape \(rows, columns\); found \(3, 4, 1\)"),
         (lambda: from_depth(torch.zeros(5, 5)), "mask is empty"),
         (lambda: plane(4, 4, normal=(0.0, 1.0, 0.0)), "face the camera"),
         (lambda: plane(4, 4, normal=(0.0, math.nan, 1.0)), "finite"),
         (lambda: sphere(4, 4, radius=0.01), "mask is empty"),
-        (lambda: vase(0, 4), "height, width and samples must be at least 1; found 0, 4, 1"),
+        (lambda: vase(0, 4), "height, width and samples must be whole numbers of at least 1; found 0, 4, 1"),
         (lambda: vase(4, 4, samples=0), "at least 1; found 4, 4, 0"),
         (lambda: surface_of(points=torch.zeros(4, 4, 2)), "trailing 3"),
         (lambda: surface_of(normals=torch.zeros(4, 3, 3)), "points and normals must be mask's shape"),

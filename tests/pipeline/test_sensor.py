@@ -139,8 +139,8 @@ def test_gradient_is_finite_in_darkness():
 @pytest.mark.parametrize(
     ("bad", "message"),
     [
-        ({"exposure": 0.0}, r"Sensor\.exposure must be positive; found 0\.0"),
-        ({"exposure": math.nan}, r"Sensor\.exposure must be positive; found nan"),
+        ({"exposure": 0.0}, r"Sensor\.exposure must be positive and finite; found 0\.0"),
+        ({"exposure": math.nan}, r"Sensor\.exposure must be positive and finite; found nan"),
         ({"psf_sigma": -1.0}, r"Sensor\.psf_sigma must not be negative \[pixel\]; found -1\.0"),
         ({"read_noise": -0.1}, r"Sensor\.read_noise must not be negative"),
         ({"full_well": 0.0}, r"Sensor\.full_well must be positive \[electrons\]; found 0\.0"),

@@ -212,8 +212,8 @@ def test_cosines_come_from_the_masked_points():
         (lambda: Distant(torch.zeros(3)), r"Distant\.direction must be a finite non-zero vector"),
         (lambda: Distant(torch.tensor([0.0, math.nan, 1.0])), r"Distant\.direction"),
         (lambda: Distant(torch.ones(2)), r"Distant\.direction"),
-        (lambda: Distant.from_angle(0, -1.0), r"Distant\.irradiance must not be negative; found -1\.0"),
-        (lambda: Ambient(-0.5), r"Ambient\.radiance must not be negative; found -0\.5"),
+        (lambda: Distant.from_angle(0, -1.0), r"Distant\.irradiance must be finite and not negative; found -1\.0"),
+        (lambda: Ambient(-0.5), r"Ambient\.radiance must be finite and not negative; found -0\.5"),
         (lambda: Scene(sphere(8, 8), []), r"Scene\.lights must hold .*found none"),
     ],
 )
