@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from torchbrdf import BRDF, Interval, trainable
+from torchbrdf import BRDF, Interval, Simplex, trainable
 
 _EXPOSURE = Interval(0.0, torch.inf)
 
@@ -16,7 +16,7 @@ class Unknown:
 
     name: str
     raw_name: str
-    domain: Interval | None
+    domain: Interval | Simplex | None
     start: Tensor
     per_texel: bool
 

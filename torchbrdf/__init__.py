@@ -10,36 +10,54 @@ Conventions, stated once:
 - Below the horizon f_r is 0 with zero gradient.
 """
 
-from torchbrdf.brdf import BRDF, LinearBRDF, WeightedSum
+from torchbrdf.brdf import BRDF, ImageBRDF, LinearBRDF, WeightedSum
 from torchbrdf.directions import Cosines
 from torchbrdf.models.lambert import Lambert
+from torchbrdf.models.oren_nayar.anisotropic import AnisotropicRoughSurface
 from torchbrdf.models.oren_nayar.functional import OrenNayar, oren_nayar
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar, qualitative
+from torchbrdf.models.oren_nayar.rough_surface import ClosedFormRoughSurface, RoughSurface, TabulatedRoughSurface
+from torchbrdf.models.oren_nayar.single_slope import ClosedFormVCavities, SingleSlopeVCavities, UnidirectionalVCavities
 from torchbrdf.parameters import (
     Constrained,
     Interval,
+    Simplex,
     fixed,
     sigma_from_beckmann_alpha,
     sigma_from_degrees,
     sigma_from_mean_slope,
     trainable,
 )
+from torchbrdf.slopes import gaussian_weights, sample_slope, shared_slopes, tabulated_weights
 
 __all__ = [
     "BRDF",
+    "AnisotropicRoughSurface",
+    "ClosedFormRoughSurface",
+    "ClosedFormVCavities",
     "Constrained",
     "Cosines",
+    "ImageBRDF",
     "Interval",
     "Lambert",
     "LinearBRDF",
     "OrenNayar",
     "QualitativeOrenNayar",
+    "RoughSurface",
+    "Simplex",
+    "SingleSlopeVCavities",
+    "TabulatedRoughSurface",
+    "UnidirectionalVCavities",
     "WeightedSum",
     "fixed",
+    "gaussian_weights",
     "oren_nayar",
     "qualitative",
+    "sample_slope",
+    "shared_slopes",
     "sigma_from_beckmann_alpha",
     "sigma_from_degrees",
     "sigma_from_mean_slope",
+    "tabulated_weights",
     "trainable",
 ]

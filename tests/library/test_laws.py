@@ -14,6 +14,8 @@ from torchbrdf import testing as laws
 
 TOLERANCE = laws.TOLERANCE
 HARD = list(laws.hard_directions())
+CAPTURED = [m for m in MODELS if m.captured]
+ISOTROPIC = [m for m in MODELS if m.isotropic]
 EXCEPTIONS = [m for m in MODELS if m.reason]
 TRAINED = [m for m in MODELS if any(True for _ in m.make(torch.float32).parameters())]
 
@@ -178,6 +180,7 @@ def test_functional_call_reads_the_given_parameters(model):
     assert torch.equal(functional_call(brdf, moved, directions), expected(*directions))
 
 
+@pytest.mark.parametrize("model", CAPTURED, ids=lambda m: m.name)
 @pytest.mark.parametrize("backend", ["eager", "aot_eager"])
 def test_captured_in_one_graph(model, backend):
     # The graph and its derivative, without code generation: what can break model by model.
@@ -289,6 +292,7 @@ def test_random_directions_stay_within_the_angle():
         assert math.cos(math.radians(85)) - 1e-12 < cosine.min() < math.cos(math.radians(80))
 
 
+@pytest.mark.parametrize("model", ISOTROPIC, ids=lambda m: m.name)
 def test_directional_albedo_agrees_with_another_quadrature(model):
     # 128 nodes without regard to kinks against panels that end at them.
     brdf = model.make(torch.float64)
