@@ -30,9 +30,9 @@ from torchbrdf.parameters import (
 )
 from torchbrdf.slopes import gaussian_weights, sample_slope, shared_slopes, tabulated_weights
 
-__all__ = [
-    "BRDF",
+__all__ = [  # noqa: RUF022 - in plain order
     "AnisotropicRoughSurface",
+    "BRDF",
     "ClosedFormRoughSurface",
     "ClosedFormVCavities",
     "Constrained",

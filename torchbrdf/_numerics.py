@@ -49,12 +49,11 @@ def dot(a: Tensor, b: Tensor) -> Tensor:
     return ax * bx + ay * by + az * bz
 
 
-def triple(a: Tensor, b: Tensor, c: Tensor) -> Tensor:
-    """a . (b x c) of (..., 3) vectors, on components."""
+def cross(a: Tensor, b: Tensor) -> Tensor:
+    """Cross product of (..., 3) vectors that broadcast."""
     ax, ay, az = a.unbind(-1)
     bx, by, bz = b.unbind(-1)
-    cx, cy, cz = c.unbind(-1)
-    return ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    return torch.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), -1)
 
 
 def safe_sqrt(x: Tensor) -> Tensor:

@@ -10,12 +10,12 @@ from torch import Tensor
 from torchbrdf._numerics import (
     SUPPORTED_DTYPES,
     angle_over_sine,
+    cross,
     dot,
     holds,
     horizon,
     safe_divide,
     safe_sqrt,
-    triple,
     unit_tolerance,
 )
 
@@ -117,7 +117,8 @@ class Cosines:
         digits where it is small.
         """
         if self.vectors is not None:
-            volume = triple(*self.vectors).masked_fill(~self.above_horizon, 0.0)
+            n, s, v = self.vectors
+            volume = dot(n, cross(s, v)).masked_fill(~self.above_horizon, 0.0)
             return volume.abs()
         squares = self.light * self.light + self.view * self.view + self.phase * self.phase
         return safe_sqrt(1 - squares + 2 * self.light * self.view * self.phase)
@@ -134,21 +135,18 @@ class Cosines:
                 "to the model or to Cosines.of. Its directional albedo depends on the azimuth and is not defined."
             )
         normal, *directions = self.vectors
-        tangent = _normalized("tangent", self.tangent)
-        along = dot(normal, tangent)
-        squared = (1 - along) * (1 + along)
-        parallel = squared <= unit_tolerance(squared.dtype)
+        bitangent = cross(normal, _normalized("tangent", self.tangent))
+        squared = dot(bitangent, bitangent)
+        parallel = squared <= unit_tolerance(squared.dtype) ** 2
         if not holds(~parallel):
             raise ValueError(
                 f"tangent must not be parallel to the normal; {int(parallel.sum())} of {parallel.numel()} are. "
                 "Choose a direction along the surface."
             )
-        length = squared.sqrt()
+        bitangent = bitangent / squared.sqrt()[..., None]
+        tangent = cross(bitangent, normal)
         below = ~self.above_horizon
-        parts = []
-        for direction in directions:
-            first = (dot(tangent, direction) - along * dot(normal, direction)) / length
-            parts += [first, triple(normal, tangent, direction) / length]
+        parts = [dot(along, direction) for direction in directions for along in (tangent, bitangent)]
         return TangentPlane(*(part.masked_fill(below, 0.0) for part in parts))
 
     @_computed_once

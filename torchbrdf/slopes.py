@@ -67,6 +67,8 @@ def gaussian_weights(sigma: Tensor, *, nodes: int) -> Tensor:
     Args: sigma (...) in [0, pi/2]. [rad]
     Returns: (..., nodes), sums to 1; (1, 0, 0, ...) at sigma = 0, with zero derivative there. [-]
     """
+    # At least 1-D inside: forward differentiation of "number * 0-d float32 tensor" yields float64.
+    shape, sigma = sigma.shape, torch.atleast_1d(sigma)
     angle = sigma.new_tensor(shared_slopes(nodes)[1:])
     base = _QUARTER_TURN * gauss_legendre(nodes - 1, sigma)[1] * angle.sin()
     scaled_total, second = gaussian_moments(sigma)
@@ -77,9 +79,9 @@ def gaussian_weights(sigma: Tensor, *, nodes: int) -> Tensor:
     missing = sigma * sigma * second - (sampled * angle * angle).sum(-1)
     second_slope = missing / (angle[1] * angle[1])
     flat = 1 - sampled.sum(-1) - second_slope
-    return torch.cat(
-        (flat[..., None], sampled[..., :1], sampled[..., 1:2] + second_slope[..., None], sampled[..., 2:]), dim=-1
-    )
+    second = sampled[..., 1:2] + second_slope[..., None]
+    weights = torch.cat((flat[..., None], sampled[..., :1], second, sampled[..., 2:]), dim=-1)
+    return weights.reshape(*shape, nodes)
 
 
 def single_slope_weights(slope: Tensor, *, nodes: int) -> Tensor:

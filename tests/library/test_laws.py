@@ -44,7 +44,7 @@ def test_zero_below_horizon(model, dtype, directions):
 
 
 def test_energy(model):
-    laws.assert_energy(model.make(torch.float64), limit=model.energy_limit)
+    laws.assert_energy(model.make(torch.float64), limit=model.energy_limit, tolerance=model.integral)
 
 
 @pytest.mark.parametrize("model", EXCEPTIONS, ids=lambda m: m.name)
@@ -104,12 +104,12 @@ def test_broadcasts_like_a_loop(model, dtype):
 
 
 def test_float32_matches_float64(model):
-    # 1e-6 of the sum of the absolute terms. Over 1.2 million directions per sigma the largest error was 7.5e-7 at
-    # sigma = 0.5, 9.7e-7 at 1.0 and 1.6e-6 at 1.2 (beyond 1e-6 in 3 of a million): a dot product near 85 deg has
-    # lost a digit before the model sees it.
+    # 1e-6 of the sum of the absolute terms, unless the catalog says why not. Of OrenNayar, over 1.2 million directions
+    # per sigma, the largest error was 7.5e-7 at sigma = 0.5, 9.7e-7 at 1.0 and 1.6e-6 at 1.2 (beyond 1e-6 in 3 of a
+    # million): a dot product near 85 deg has lost a digit before the model sees it.
     generator = torch.Generator().manual_seed(2)
     laws.assert_float32_matches_float64(
-        model.make(torch.float32), *laws.random_directions(20_000, generator=generator), rtol=1e-6
+        model.make(torch.float32), *laws.random_directions(20_000, generator=generator), rtol=model.float32
     )
 
 

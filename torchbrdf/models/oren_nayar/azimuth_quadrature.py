@@ -157,7 +157,7 @@ def _both_cut(z: Tensor, b: Tensor, cos_slope: Tensor) -> Tensor:
 
 
 def higher_bounce_means(
-    plane: SlopePlane, lobes: Lobes, correlation: Tensor, modes: CavityModes, *, order: int
+    plane: SlopePlane, lobes: Lobes, correlation: Tensor, modes: CavityModes, *, order: int, graded: bool = False
 ) -> Tensor:
     r"""Geometry side of three and more bounces: azimuth means over the modes of each slope, (1/pi) C times mean of xi_n
     xi_n.
@@ -166,19 +166,20 @@ def higher_bounce_means(
     with r_n = 0 off the lobe. The first part gives the closed form of `saturated_correlation`, the rest the same lobes
     and overlaps as two bounces.
 
-    Args: plane, lobes, correlation (..., K), modes of the same K slopes; `order` nodes on each piece.
+    Args: plane, lobes, correlation (..., K), modes of the same K slopes; `order` nodes on each piece, `graded` as in
+        `two_bounce_mean`.
     Returns: (..., K, N, 2), last axis (same facet lit, opposite facet lit); contract with
         `cavity_modes.bounce_coefficients`. [1/sr]
     """
     whole = strip_means(modes, torch.ones_like(modes.cos_slope)[:, None])[..., 0]  # G_n(1), (K, N)
-    straight, slanted = _mode_lobes(plane, lobes, modes, whole, order)
-    pairs, rims = zip(
-        *(
-            _mode_overlap(overlap_nodes(lobes, angle, order), modes, whole)
-            for angle in (plane.delta, math.pi - plane.delta)
-        ),
-        strict=True,
-    )
+    scale = root_scale(plane, lobes) if graded else None
+    crossings = (plane.crossing, plane.opposite_crossing) if graded else (None, None)
+    straight, slanted = _mode_lobes(plane, lobes, modes, whole, order=order, scale=scale)
+    pairs, rims = [], []
+    for angle, crossing in zip((plane.delta, math.pi - plane.delta), crossings, strict=True):
+        pair, rim = _mode_overlap(overlap_nodes(lobes, angle, order, crossing=crossing, scale=scale), modes, whole)
+        pairs.append(pair)
+        rims.append(rim)
     means = []
     for sign, here, there in ((1, 0, 1), (-1, 1, 0)):
         flat = whole * (1 + sign * correlation)[..., None]
@@ -192,7 +193,7 @@ def _coupling_change(modes: CavityModes, whole: Tensor, z: Tensor) -> Tensor:
 
 
 def _mode_lobes(
-    plane: SlopePlane, lobes: Lobes, modes: CavityModes, whole: Tensor, order: int
+    plane: SlopePlane, lobes: Lobes, modes: CavityModes, whole: Tensor, *, order: int, scale: Tensor | None
 ) -> tuple[Tensor, Tensor]:
     """Lobe means of r_n, plain and times the other projection, both directions added; each (..., K, N)."""
     straight, slanted = [], []
@@ -200,7 +201,7 @@ def _mode_lobes(
         (lobes.half_light, lobes.light, plane.tan_light),
         (lobes.half_view, lobes.view, plane.tan_view),
     ):
-        z, weight = half_lobe(half, projection, order)
+        z, weight = half_lobe(half, projection, order, scale=scale)
         change = _coupling_change(modes, whole, z) * weight[..., None, :]
         slant = safe_divide(plane.dot, tangent * tangent, where=tangent > 0)
         straight.append(change.sum(-1))

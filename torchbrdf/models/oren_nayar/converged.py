@@ -127,6 +127,7 @@ def _higher(plane: SlopePlane, sigma: Tensor, albedo: Tensor, modes: int, *, nod
         tan_slope=angle.tan(),
         bounces=Bounces(two=False, modes=modes),
         order=order,
+        graded=True,
         modes=cavities,
     ).higher
     eigenvalues = cavities.eigenvalues

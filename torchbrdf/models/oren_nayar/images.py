@@ -22,6 +22,10 @@ from torchbrdf.models.oren_nayar.interreflection import two_bounce_facet
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane
 
 
+# With more, the quadrature and the fit behind the modes lose all digits on shallow slopes.
+MOST_MODES = 24
+
+
 class Bounces(NamedTuple):
     """Which light is followed: reflected once, twice, or more often (by `modes` a slope; 0 leaves it out)."""
 
@@ -30,11 +34,11 @@ class Bounces(NamedTuple):
 
     @classmethod
     def of(cls, name: str, bounces: "int | str", modes: int) -> "Bounces":
-        """From the arguments of a model; raises ValueError unless they are 1, 2 or "all", and at least 3 modes."""
+        """From the arguments of a model; raises ValueError unless they are 1, 2 or "all", and 3 to 24 modes."""
         if bounces not in (1, 2, "all"):
             raise ValueError(f'{name}.bounces must be 1, 2 or "all"; found {bounces!r}.')
-        if bounces == "all" and modes < 3:
-            raise ValueError(f"{name}.modes must be at least 3; found {modes}.")
+        if bounces == "all" and not 3 <= modes <= MOST_MODES:
+            raise ValueError(f"{name}.modes must be 3 to {MOST_MODES}; found {modes}.")
         return cls(bounces != 1, modes if bounces == "all" else 0)
 
     def named(self, direct: Tensor, two_bounce: Tensor, higher: Tensor) -> dict[str, Tensor]:
@@ -87,7 +91,7 @@ def mean_images(
     if modes is None:
         higher = direct.new_zeros((*direct.shape[:-1], 0, 0, 2))
     else:
-        higher = higher_bounce_means(wide, lobes, correlation, modes, order=order)
+        higher = higher_bounce_means(wide, lobes, correlation, modes, order=order, graded=graded)
     return Images(direct, two, higher)
 
 

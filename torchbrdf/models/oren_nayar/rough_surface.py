@@ -21,7 +21,7 @@ BounceCount = Literal[1, 2, "all"]
 class SharedSlopes(ImageBRDF):
     """A surface with `nodes` shared slope angles: exact images of each slope, weights of the subclass."""
 
-    def __init__(self, *, nodes: int, order: int, bounces: BounceCount, modes: int):
+    def __init__(self, *, nodes: int, order: int, graded: bool, bounces: BounceCount, modes: int):
         super().__init__()
         name = type(self).__name__
         if order < 1:
@@ -29,6 +29,7 @@ class SharedSlopes(ImageBRDF):
         shared_slopes(nodes)  # refuses fewer than three
         self.nodes = nodes
         self.order = order
+        self.graded = graded
         self._bounces = Bounces.of(name, bounces, modes)
 
     @abstractmethod
@@ -52,6 +53,7 @@ class SharedSlopes(ImageBRDF):
             tan_slope=slopes.tan().to(plane.dot.dtype),
             bounces=self._bounces,
             order=self.order,
+            graded=self.graded,
             modes=self._modes(plane.dot),
         )
         return found.flat()
@@ -84,6 +86,8 @@ class RoughSurface(SharedSlopes):
         sigma: roughness, scalar or (...). [rad] in [0, pi/2]; 0 is Lambert exactly, without a jump.
         nodes: shared slope angles, the flat facet included.
         order: azimuth nodes on each piece of the interreflection.
+        graded: split the pieces and thicken the nodes where the integrand turns, at 3 times the cost: two bounces
+            are then good to 1e-8 at order 16.
         bounces: 1 (direct), 2 or "all" inside a cavity.
         modes: eigenmodes a slope that carry three and more bounces.
     Components: direct, two_bounce, higher (those followed).
@@ -107,10 +111,11 @@ class RoughSurface(SharedSlopes):
         sigma: Tensor | float | fixed = 0.3,
         nodes: int = 16,
         order: int = 4,
+        graded: bool = False,
         bounces: BounceCount = 2,
         modes: int = 4,
     ):
-        super().__init__(nodes=nodes, order=order, bounces=bounces, modes=modes)
+        super().__init__(nodes=nodes, order=order, graded=graded, bounces=bounces, modes=modes)
         self.albedo = albedo
         self.sigma = sigma
 
@@ -132,7 +137,7 @@ class TabulatedRoughSurface(SharedSlopes):
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
         weights: shares of the slopes `slopes.shared_slopes(nodes)` in the horizontal area, (nodes,) or
             (..., nodes). [-] They sum to 1; trained ones are above 0. See `slopes.tabulated_weights`.
-        order, bounces, modes: as in `RoughSurface`.
+        order, graded, bounces, modes: as in `RoughSurface`.
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError for weights that are no shares, and as `RoughSurface`.
     Deviations: a distribution narrower than the distance of neighbouring slopes is not resolved.
@@ -148,11 +153,14 @@ class TabulatedRoughSurface(SharedSlopes):
         albedo: Tensor | float | fixed = 0.5,
         weights: Tensor | fixed,
         order: int = 4,
+        graded: bool = False,
         bounces: BounceCount = 2,
         modes: int = 4,
     ):
         given = torch.as_tensor(weights.value if isinstance(weights, fixed) else weights)
-        super().__init__(nodes=given.shape[-1] if given.ndim else 0, order=order, bounces=bounces, modes=modes)
+        super().__init__(
+            nodes=given.shape[-1] if given.ndim else 0, order=order, graded=graded, bounces=bounces, modes=modes
+        )
         self.albedo = albedo
         self.weights = weights
 

@@ -47,9 +47,8 @@ class SingleSlopeVCavities(BRDF):
         modes: eigenmodes that carry three and more bounces.
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError outside the domains, and for all bounces with a trained slope (their modes have no derivative).
-    Deviations: none in direct light (2e-14 of adaptive quadrature). Zero subgradient at light = view. Three and more
-        bounces use an ungraded rule: about 1e-3 of that part at order 16. They are read from a number and so break the
-        graph of torch.compile.
+    Deviations: none in direct light (2e-14 of adaptive quadrature). Zero subgradient at light = view. The modes of
+        three and more bounces are looked up by the number that the slope is, which breaks the graph of torch.compile.
     Source: Oren & Nayar 1994 (long version), section 4.2, eqs. (23), (19), (46); azimuth means: own derivation.
     """
 
@@ -139,7 +138,7 @@ class UnidirectionalVCavities(BRDF):
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError outside the domains, without a tangent, and for all bounces with a trained slope.
     Deviations: none for two bounces; the BRDF itself has kinks where a facet starts to be cut. With all bounces the
-        graph of torch.compile breaks.
+        graph of torch.compile breaks, as in `SingleSlopeVCavities`.
     Source: Oren & Nayar 1994 (long version), section 4.1, eqs. (19), (22), (38) repaired.
     """
 

@@ -29,13 +29,15 @@ class SlopePlane(NamedTuple):
 def slope_plane(cosines: Cosines) -> SlopePlane:
     """Slope-plane coordinates (...) of light and view.
 
+    The mean over azimuth is reciprocal; here the more grazing of the two directions always plays the light, so that
+    exchanging them changes no bit, at any order of a quadrature.
     Derivatives: |p|, |q| and delta are roots of quantities that vanish at normal incidence and in the plane of
     incidence. Their derivative is taken as 0 there. Every function of these modules is even about those points or
     reads `dot` for its odd part, so that derivatives with respect to the *vectors* stay exact; only at light = view, a
     genuine cone of the BRDF, is the zero a choice among subgradients.
     Below the horizon all fields describe a light and a view along the normal.
     """
-    light, view = cosines.light, cosines.view
+    light, view = cosines.alpha, cosines.beta
     product = light * view
     # (1-c)(1+c) keeps the digits that 1 - c*c loses next to the normal.
     tan_light = safe_sqrt((1 - light) * (1 + light)) / light
