@@ -1,14 +1,17 @@
 """Independent path tracer of real V-grooves: ray-segment intersections in numpy, none of the library's formulas.
 
-A groove has its valley at the origin and ridges at (+-cos, sin) of the slope angle; x runs across, y along, z up. Paths start at the viewer, enter the
-opening at a uniformly distributed point, and at every hit collect the light that reaches it unblocked.
+A groove has its valley at the origin and ridges at (+-cos, sin) of the slope angle; x runs across, y along, z up. Paths
+start at the viewer, enter the opening at a uniformly distributed point, and at every hit collect the light that reaches
+it unblocked.
 """
 
 import numpy as np
 
 
 def trace(light, view, slope, turn, *, albedo, bounces, rng):
-    """Per-path BRDF contributions (path, bounce). light, view (3,); slope, turn (path,): groove angle and azimuth of its across-direction. [1/sr]"""
+    """Per-path BRDF contributions (path, bounce). light, view (3,); slope, turn (path,): groove angle and azimuth of
+    its across-direction. [1/sr]
+    """
     light, view = _turned(light, turn), _turned(view, turn)
     half_width, depth = np.cos(slope), np.sin(slope)
     # Stand on the opening z = depth at x and walk down against the view direction until a facet is met.
@@ -32,11 +35,16 @@ def trace(light, view, slope, turn, *, albedo, bounces, rng):
 
 def _turned(vector, turn):
     cosine, sine = np.cos(turn), np.sin(turn)
-    return np.stack((cosine * vector[0] + sine * vector[1], -sine * vector[0] + cosine * vector[1], np.full_like(turn, vector[2])), axis=-1)
+    return np.stack(
+        (cosine * vector[0] + sine * vector[1], -sine * vector[0] + cosine * vector[1], np.full_like(turn, vector[2])),
+        axis=-1,
+    )
 
 
 def _meet(point, direction, side, half_width, depth):
-    """Parameter along the facet (0 valley, 1 ridge) and meeting point of the ray with the line of facet `side`; parameter nan if behind."""
+    """Parameter along the facet (0 valley, 1 ridge) and meeting point of the ray with the line of facet `side`;
+    parameter nan if behind.
+    """
     fx, fz = side * half_width, depth
     determinant = direction[:, 0] * fz - direction[:, 2] * fx
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,5 +1,8 @@
-"""One slope angle: azimuth means against adaptive quadrature of the integrand written from the paper's vectors and strips."""
+"""One slope angle: azimuth means against adaptive quadrature of the integrand written from the paper's vectors and
+strips.
+"""
 
+import itertools
 import math
 
 import numpy as np
@@ -8,15 +11,30 @@ import torch
 from scipy.integrate import quad
 
 from torchbrdf.attenuation import direct_integrand, geometric_attenuation
-from torchbrdf.models.oren_nayar.azimuth import direct_mean, saturated_correlation, saturated_lobes, two_bounce_mean_approximate
+from torchbrdf.models.oren_nayar.azimuth import (
+    direct_mean,
+    saturated_correlation,
+    saturated_lobes,
+    two_bounce_mean_approximate,
+)
 from torchbrdf.models.oren_nayar.azimuth_paper import direct_mean_paper, two_bounce_mean_paper
 from torchbrdf.models.oren_nayar.azimuth_quadrature import two_bounce_mean
-from torchbrdf.models.oren_nayar.interreflection import two_bounce_factor, two_bounce_factor_approximate, two_bounce_integrand
+from torchbrdf.models.oren_nayar.interreflection import (
+    two_bounce_factor,
+    two_bounce_factor_approximate,
+    two_bounce_integrand,
+)
 from torchbrdf.models.oren_nayar.slope_plane import slope_plane_from_angles
 
 RNG = np.random.default_rng(5)
 CASES = [(*RNG.uniform(0, 1.5, 2), RNG.uniform(0, math.pi), RNG.uniform(0.05, 1.5)) for _ in range(25)]
-CASES += [(0.0, 1.2, 0.4, 1.0), (1.3, 1.3, 0.0, 1.2), (1.3, 1.3, math.pi, 1.2), (1.4, 1.1, 0.5 * math.pi, 1.3), (1.0, 1.4, 0.0, 0.9)]
+CASES += [
+    (0.0, 1.2, 0.4, 1.0),
+    (1.3, 1.3, 0.0, 1.2),
+    (1.3, 1.3, math.pi, 1.2),
+    (1.4, 1.1, 0.5 * math.pi, 1.3),
+    (1.0, 1.4, 0.0, 0.9),
+]
 
 
 def f64(*values):
@@ -53,13 +71,18 @@ def facets(theta_i, theta_r, delta, slope):
         if sb <= 0 or va <= 0:
             return 0.0
         hidden_v, hidden_s = (max(0.0, min(1.0, -m)) for m in (v @ b / va, s @ a / sb))
-        exchange = distance(1, hidden_s, slope) + distance(1, hidden_v, slope) - distance(hidden_s, hidden_v, slope) - distance(1, 1, slope)
+        exchange = (
+            distance(1, hidden_s, slope)
+            + distance(1, hidden_v, slope)
+            - distance(hidden_s, hidden_v, slope)
+            - distance(1, 1, slope)
+        )
         return sb * va / (math.pi * a[2] * v[2] * s[2]) * 0.5 * exchange
 
     return direct, two
 
 
-def azimuth_mean(function, theta_i, theta_r, delta, slope, rtol):
+def azimuth_mean(function, theta_i, theta_r, delta, slope, *, rtol):
     """Adaptive, cut at every shadow and mask edge and where the two coincide."""
     cuts = {0.0, 2 * math.pi}
     for theta, centre in ((theta_i, 0.0), (theta_r, delta)):
@@ -70,7 +93,11 @@ def azimuth_mean(function, theta_i, theta_r, delta, slope, rtol):
     for difference in (p - q, p + q):
         cuts |= {(math.atan2(difference[0], -difference[1]) + turn) % (2 * math.pi) for turn in (0, math.pi)}
     edges = sorted(cuts)
-    parts = [quad(function, a, b, epsabs=1e-15, epsrel=rtol, limit=200)[0] for a, b in zip(edges, edges[1:], strict=False) if b - a > 1e-14]
+    parts = [
+        quad(function, a, b, epsabs=1e-15, epsrel=rtol, limit=200)[0]
+        for a, b in itertools.pairwise(edges)
+        if b - a > 1e-14
+    ]
     return math.fsum(parts) / (2 * math.pi)
 
 
@@ -79,7 +106,9 @@ def azimuth_mean(function, theta_i, theta_r, delta, slope, rtol):
 @pytest.mark.parametrize("case", CASES)
 def test_direct_mean_is_the_integral(case):
     plane, slope = plane_and_slope(*case)
-    assert direct_mean(plane, **slope).item() == pytest.approx(azimuth_mean(facets(*case)[0], *case, 1e-13), rel=1e-12, abs=1e-15)
+    assert direct_mean(plane, **slope).item() == pytest.approx(
+        azimuth_mean(facets(*case)[0], *case, rtol=1e-13), rel=1e-12, abs=1e-15
+    )
 
 
 @pytest.mark.filterwarnings("ignore:.*roundoff.*")
@@ -87,9 +116,11 @@ def test_direct_mean_is_the_integral(case):
 def test_two_bounce_mean_is_the_integral(case):
     plane, slope = plane_and_slope(*case)
     lobes = saturated_lobes(plane, **slope)
-    expected = azimuth_mean(facets(*case)[1], *case, 1e-11)
+    expected = azimuth_mean(facets(*case)[1], *case, rtol=1e-11)
     correlation = saturated_correlation(plane, lobes)
-    assert two_bounce_mean(plane, lobes, correlation, order=24, graded=True).item() == pytest.approx(expected, rel=1e-9, abs=1e-15)
+    assert two_bounce_mean(plane, lobes, correlation, order=24, graded=True).item() == pytest.approx(
+        expected, rel=1e-9, abs=1e-15
+    )
     assert two_bounce_mean(plane, lobes, correlation, order=5).item() == pytest.approx(expected, rel=6e-3, abs=4e-4)
 
 
@@ -97,11 +128,18 @@ def test_two_bounce_mean_is_the_integral(case):
 def test_paper_forms_are_exact_in_and_across_the_plane(delta):
     for theta_i, theta_r, slope_angle in RNG.uniform(0.02, 1.5, (200, 3)):
         plane, slope = plane_and_slope(theta_i, theta_r, delta, slope_angle)
-        torch.testing.assert_close(direct_mean_paper(plane, **slope), direct_mean(plane, **slope), rtol=1e-12, atol=1e-13)
-        torch.testing.assert_close(two_bounce_mean_paper(plane, **slope), two_bounce_mean_approximate(plane, **slope), rtol=1e-12, atol=1e-13)
+        torch.testing.assert_close(
+            direct_mean_paper(plane, **slope), direct_mean(plane, **slope), rtol=1e-12, atol=1e-13
+        )
+        torch.testing.assert_close(
+            two_bounce_mean_paper(plane, **slope), two_bounce_mean_approximate(plane, **slope), rtol=1e-12, atol=1e-13
+        )
 
 
-@pytest.mark.parametrize("hidden_s, hidden_v, slope", [(0.0, 0.0, 0.4), (0.3, 0.6, 0.9), (0.9, 0.0, 1.4), (1.0, 0.2, 0.7), (0.3, 0.3, 0.01)])
+@pytest.mark.parametrize(
+    ("hidden_s", "hidden_v", "slope"),
+    [(0.0, 0.0, 0.4), (0.3, 0.6, 0.9), (0.9, 0.0, 1.4), (1.0, 0.2, 0.7), (0.3, 0.3, 0.01)],
+)
 def test_two_bounce_factor_is_hottels_crossed_strings(hidden_s, hidden_v, slope):
     def point(x, side):
         return np.array([side * x * math.cos(slope), x * math.sin(slope)])
@@ -119,7 +157,9 @@ def test_two_bounce_factor_is_hottels_crossed_strings(hidden_s, hidden_v, slope)
 
 def test_collapsed_integrand_equals_strips():
     """X' Y IF / (pi S^2) in the collapsed form against the factor and its strips."""
-    for light, view, slope in zip(RNG.uniform(-3, 9, 300), RNG.uniform(-3, 9, 300), RNG.uniform(0.1, 1.5, 300), strict=True):
+    for light, view, slope in zip(
+        RNG.uniform(-3, 9, 300), RNG.uniform(-3, 9, 300), RNG.uniform(0.1, 1.5, 300), strict=True
+    ):
         x, y = max(0, 1 + light), max(0, 1 + view)
         hidden = [min(1.0, max(0.0, 1 - 2 / z)) if z > 0 else 1.0 for z in (x, y)]
         factor = two_bounce_factor(*f64(*hidden), cos_slope=f64(math.cos(slope))[0]).item()

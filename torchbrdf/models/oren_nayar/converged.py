@@ -44,7 +44,7 @@ def converged(
     albedo: Tensor | None = None,
     panel_order: int = 16,
     order: int = 32,
-    modes: int = 12,
+    modes: int = 16,
     higher_slopes: int = 96,
     higher_order: int = 12,
     chunk: int = 8,
@@ -56,7 +56,11 @@ def converged(
         sigma: broadcastable with them, in [0, pi/2]. [rad]
         albedo: broadcastable, for three and more bounces; None leaves those out. [-]
         panel_order, order: nodes on each slope panel and each azimuth piece; modes: per slope.
+        higher_slopes, higher_order: shared slopes and azimuth nodes of three and more bounces.
         chunk: directions at a time (memory).
+    Accuracy: direct and two bounces within 1e-11 and 3e-9 of the golden values. Three and more bounces are known less
+        well: relative to the whole BRDF at rho = 1, 60 directions up to 85 deg, `modes` = 12 and 16 differ from 20 by
+        1.1e-7 and 2.3e-8 at sigma = 0.3, and by 5e-5 and 1.8e-5 at sigma = 1. More than 20 lose digits instead.
     """
     if plane.dot.dtype != torch.float64:
         raise TypeError(

@@ -21,9 +21,8 @@ from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, bounce_coeffic
 from torchbrdf.models.oren_nayar.interreflection import two_bounce_facet
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane
 
-
-# With more, the quadrature and the fit behind the modes lose all digits on shallow slopes.
-MOST_MODES = 24
+# With more, the quadrature and the fit behind the modes lose their digits.
+MOST_MODES = 20
 
 
 class Bounces(NamedTuple):
@@ -34,7 +33,7 @@ class Bounces(NamedTuple):
 
     @classmethod
     def of(cls, name: str, bounces: "int | str", modes: int) -> "Bounces":
-        """From the arguments of a model; raises ValueError unless they are 1, 2 or "all", and 3 to 24 modes."""
+        """From the arguments of a model; raises ValueError unless they are 1, 2 or "all", and 3 to 20 modes."""
         if bounces not in (1, 2, "all"):
             raise ValueError(f'{name}.bounces must be 1, 2 or "all"; found {bounces!r}.')
         if bounces == "all" and not 3 <= modes <= MOST_MODES:

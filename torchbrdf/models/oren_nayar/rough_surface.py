@@ -91,12 +91,13 @@ class RoughSurface(SharedSlopes):
         bounces: 1 (direct), 2 or "all" inside a cavity.
         modes: eigenmodes a slope that carry three and more bounces.
     Components: direct, two_bounce, higher (those followed).
-    Raises: ValueError outside the domains, for nodes < 3, order < 1, modes < 3 or another number of bounces.
+    Raises: ValueError outside the domains, for nodes < 3, order < 1, modes outside 3..20 or another number of bounces.
     Deviations: direct light up to 85 deg, sigma 2..90 deg, is within 2.9e-3 (3.1e-4 rms) of the integral at 16
         nodes and 2.1e-4 (1.9e-5) at 48. Two bounces err by 1.7e-2 of their largest value at order 4 and 2.5e-3 at
-        order 5, most at retro-reflection from steep slopes. All light is returned at rho = 1 within 3e-4 for the
-        steepest slopes at 4 modes and 1e-7 at 12. Below the node spacing some weights are negative (to -0.8): the
-        sum is accurate, the weights are no distribution; sample slopes with `slopes.sample_slope`. Kinks: at
+        order 5, most at retro-reflection from steep slopes. Three and more bounces at rho = 1 err by 1e-5 of the whole
+        (sigma = 0.3) to 1.5e-3 (sigma = 1) at 4 modes, 1e-7 to 5e-5 at 12. The light returned at rho = 1 exceeds 1 by
+        3e-3 at order 4 for sigma = 0.9, by 1e-4 at order 16. Below the node spacing some weights are negative (to
+        -0.8): the sum is accurate, the weights are no distribution; sample slopes with `sample_slope`. Kinks: at
         light = view the zero subgradient is chosen; fractional powers where tan(theta) tan(theta_k) = 1.
     Source: Oren & Nayar 1994 (long version), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
     """
@@ -135,8 +136,8 @@ class TabulatedRoughSurface(SharedSlopes):
 
     Args:
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
-        weights: shares of the slopes `slopes.shared_slopes(nodes)` in the horizontal area, (nodes,) or
-            (..., nodes). [-] They sum to 1; trained ones are above 0. See `slopes.tabulated_weights`.
+        weights: shares of the slopes `shared_slopes(nodes)` in the horizontal area, (nodes,) or
+            (..., nodes). [-] They sum to 1; trained ones are above 0. See `tabulated_weights`.
         order, graded, bounces, modes: as in `RoughSurface`.
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError for weights that are no shares, and as `RoughSurface`.
