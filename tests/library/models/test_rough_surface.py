@@ -328,3 +328,12 @@ def test_tabulated_gaussian_is_the_gaussian():
 def test_refused(arguments):
     with pytest.raises(ValueError, match=next(reversed(arguments))):
         RoughSurface(**arguments)
+
+
+def test_converged_with_all_bounces_has_converged_in_modes():
+    """What is left beyond 16 modes, on few slopes: a few 1e-5 of the whole at the roughest and whitest."""
+    plane, albedo = random_plane(12), f64(1.0)[0]
+    for sigma, bar in ((f64(0.3)[0], 1e-7), (f64(1.0)[0], 5e-5)):
+        settings = {"albedo": albedo, "higher_slopes": 16, "higher_order": 8, "order": 8, "panel_order": 4}
+        coarse, fine = (converged(plane, sigma, modes=count, **settings) for count in (16, 20))
+        assert ((coarse.higher - fine.higher) / sum(fine)).abs().max() < bar

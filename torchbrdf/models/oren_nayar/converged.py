@@ -78,7 +78,7 @@ def converged(
         higher = (
             torch.zeros_like(direct)
             if albedos is None
-            else _higher(piece, sigmas[part], albedos[part], modes, higher_slopes, higher_order)
+            else _higher(piece, sigmas[part], albedos[part], modes=modes, nodes=higher_slopes, order=higher_order)
         )
         parts.append((direct, two, higher))
     return Converged(*(torch.cat(values).reshape(shape) for values in zip(*parts, strict=True)))
@@ -120,7 +120,7 @@ def _direct_and_two(plane: SlopePlane, sigma: Tensor, panel_order: int, order: i
     return torch.where(rough, direct, 1 / math.pi), torch.where(rough, two, 0.0)
 
 
-def _higher(plane: SlopePlane, sigma: Tensor, albedo: Tensor, modes: int, *, nodes: int, order: int) -> Tensor:
+def _higher(plane: SlopePlane, sigma: Tensor, albedo: Tensor, *, modes: int, nodes: int, order: int) -> Tensor:
     """Three and more bounces (...) on `nodes` shared slopes."""
     slopes = shared_slopes(nodes)
     cavities = modes_of(slopes, modes, torch.float64, plane.dot.device)
