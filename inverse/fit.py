@@ -174,11 +174,12 @@ def _result(unknowns: Unknowns, best: Solution, model: BRDF, samples: int, secon
     own_error = covariance.own.sqrt() * noise
 
     parameters, errors = {}, {}
-    shared_pieces = zip(unknowns.split_shared(best.shared), unknowns.split_shared(shared_error * noise), strict=True)
-    for (entry, raw), (_, error) in shared_pieces:
-        shape = entry.start.shape
-        parameters[entry.name] = entry.physical(raw).reshape(shape)
-        errors[entry.name] = entry.physical_error(raw, error).reshape(shape)
+    position = 0
+    for entry, raw in unknowns.split_shared(best.shared):
+        block = slice(position, position := position + len(raw))
+        value, error = entry.physical(raw), entry.shared_error(raw, covariance.shared[block, block] * noise**2)
+        shape = entry.start.shape if value.numel() == entry.start.numel() else value.shape
+        parameters[entry.name], errors[entry.name] = value.reshape(shape), error.reshape(shape)
     for (entry, raw), (_, error) in zip(unknowns.split_own(best.own), unknowns.split_own(own_error), strict=True):
         shape = (-1, *entry.start.shape[1:])
         unused = torch.full_like(entry.start, torch.nan)  # texels outside the used pixels

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from inverse.levenberg import NormalEquations, Solution, scale
 from inverse.unknowns import Unknown, Unknowns
+from torchbrdf import Interval
 
 # A standard error above this share of the parameter's domain tells next to nothing.
 _UNINFORMATIVE = 0.25
@@ -89,7 +90,7 @@ def _texels(unknowns: Unknowns, solution: Solution, covariance: Covariance) -> s
     lost = (~covariance.own.isfinite()).any(1)
     on_bound = torch.zeros_like(lost)
     for entry, raw in unknowns.split_own(solution.own):
-        if entry.domain is not None and math.isfinite(entry.domain.high):
+        if isinstance(entry.domain, Interval) and math.isfinite(entry.domain.high):
             width = entry.domain.high - entry.domain.low
             on_bound |= (entry.slope(raw) < _FLAT * width).any(1)
     counts = {"not identified": int(lost.sum()), "on a bound": int((on_bound & ~lost).sum())}
@@ -99,7 +100,7 @@ def _texels(unknowns: Unknowns, solution: Solution, covariance: Covariance) -> s
 
 def _judge_one(entry: Unknown, label: str, raw: Tensor, raw_error: Tensor) -> tuple[str, str] | None:
     domain = entry.domain
-    if domain is None:
+    if not isinstance(domain, Interval):
         return None
     value, error = entry.physical(raw).item(), (entry.slope(raw) * raw_error).item()
     width = domain.high - domain.low

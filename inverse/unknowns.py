@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from torchbrdf import BRDF, Interval, trainable
+from torchbrdf import BRDF, Interval, Simplex, trainable
 
 _EXPOSURE = Interval(0.0, torch.inf)
 
@@ -16,7 +16,7 @@ class Unknown:
 
     name: str
     raw_name: str
-    domain: Interval | None
+    domain: Interval | Simplex | None
     start: Tensor
     per_texel: bool
 
@@ -36,6 +36,13 @@ class Unknown:
         # where only the square is told from 0, an error larger than the value has no symmetric meaning
         largest = self.physical(raw) - self.domain.low if self.domain.even else self.domain.high - self.domain.low
         return error.masked_fill(~(error <= largest), torch.inf)
+
+    def shared_error(self, raw: Tensor, covariance: Tensor) -> Tensor:
+        """Error of each entry of a shared value from the covariance of its coordinates."""
+        if not isinstance(self.domain, Simplex):
+            return self.physical_error(raw, covariance.diagonal().sqrt())
+        slopes = torch.func.jacfwd(self.physical)(raw).to(covariance.dtype)  # shares depend on all coordinates
+        return torch.einsum("ij,jk,ik->i", slopes, covariance, slopes).sqrt().to(raw.dtype)
 
     def labels(self) -> list[str]:
         """A name for each entry of a shared unknown."""
@@ -68,6 +75,8 @@ class Unknowns:
                     f"{name} must be per texel {wanted}, one for each of the {points} masked points, or shared; "
                     f"found shape {tuple(start.shape)}."
                 )
+            if per_texel and isinstance(domain, Simplex):
+                raise ValueError(f"{name} cannot be fitted per texel: its shares are not independent.")
             self.entries.append(Unknown(name, raw_name, domain, start, per_texel))
         known = {entry.raw_name for entry in self.entries}
         strangers = [name for name, p in model.named_parameters() if p.requires_grad and name not in known]

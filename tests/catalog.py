@@ -2,11 +2,33 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 
-from torchbrdf import BRDF, Lambert, OrenNayar, QualitativeOrenNayar, fixed
+from torchbrdf import (
+    BRDF,
+    AnisotropicRoughSurface,
+    ClosedFormRoughSurface,
+    ClosedFormVCavities,
+    Cosines,
+    Lambert,
+    OrenNayar,
+    QualitativeOrenNayar,
+    RoughSurface,
+    SingleSlopeVCavities,
+    TabulatedRoughSurface,
+    UnidirectionalVCavities,
+    fixed,
+)
+from torchbrdf.testing import TOLERANCE
+
+# Every slope angle is a kink of its own, in the polar angle and in azimuth.
+KINKED = 5e-5
+# Grazing directions meet steep slopes with projections of some hundred, of which 1 is subtracted again.
+STEEP = 1e-5
+# The strip means of the modes are sums of terms that cancel by one digit.
+MODAL = 1e-4
 
 
 @dataclass(frozen=True)
@@ -22,6 +44,10 @@ class Model:
     least: float = 0.0
     energy_limit: float = 1.0
     reason: str = ""
+    integral: float = TOLERANCE[torch.float64].integral  # of the energy law: kinks inside its panels cost digits
+    float32: float = 1e-6  # relative to the sum of the absolute terms
+    captured: bool = True  # whether torch.compile is tried: the cheapest configuration of a model stands for the others
+    isotropic: bool = True
 
     def __post_init__(self):
         excepted = self.least < 0 or self.energy_limit > 1
@@ -36,6 +62,18 @@ def colour(dtype: torch.dtype) -> torch.Tensor:
 
 def number(value: float, dtype: torch.dtype) -> torch.Tensor:
     return torch.tensor(value, dtype=dtype)
+
+
+class Brushed(BRDF):
+    """An anisotropic model with its tangent given once, so that the laws can pass three directions."""
+
+    def __init__(self, brdf: BRDF, dtype: torch.dtype):
+        super().__init__()
+        self.brdf = brdf
+        self.register_buffer("tangent", torch.tensor([0.6, 0.64, 0.48], dtype=dtype))
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, torch.Tensor]:
+        return self.brdf.evaluate_components(replace(cosines, tangent=self.tangent))
 
 
 def mixture(dtype: torch.dtype) -> BRDF:
@@ -86,4 +124,93 @@ MODELS = [
         reason="0.57 stands for interreflection at one albedo only: 1.0442 at grazing, rho = 1, sigma = 0.3",
     ),
     Model("weighted sum", mixture),
+    Model(
+        "rough surface, direct",
+        lambda dtype: RoughSurface(albedo=colour(dtype), sigma=number(0.5, dtype), nodes=4, bounces=1),
+        integral=KINKED,
+        float32=STEEP,
+    ),
+    Model(
+        "rough surface",
+        lambda dtype: RoughSurface(albedo=colour(dtype), sigma=number(0.5, dtype), nodes=5, order=3),
+        captured=False,
+        integral=KINKED,
+        float32=STEEP,
+    ),
+    Model(
+        "rough surface, white, all bounces",
+        lambda dtype: RoughSurface(
+            albedo=fixed(number(1.0, dtype)), sigma=number(0.9, dtype), nodes=3, order=6, graded=True, bounces="all"
+        ),
+        captured=False,
+        integral=KINKED,
+        float32=MODAL,
+    ),
+    Model(
+        "rough surface, fixed sigma = 0",
+        lambda dtype: RoughSurface(albedo=colour(dtype), sigma=fixed(number(0.0, dtype)), nodes=4, order=3),
+        captured=False,
+    ),
+    Model(
+        "tabulated rough surface",
+        lambda dtype: TabulatedRoughSurface(
+            albedo=colour(dtype), weights=torch.tensor([0.2, 0.5, 0.2, 0.1], dtype=dtype), order=3
+        ),
+        captured=False,
+        integral=KINKED,
+        float32=STEEP,
+    ),
+    Model(
+        "closed-form rough surface",
+        lambda dtype: ClosedFormRoughSurface(albedo=colour(dtype), sigma=number(0.5, dtype), nodes=4),
+        integral=KINKED,
+        float32=STEEP,
+    ),
+    Model(
+        "single slope",
+        lambda dtype: SingleSlopeVCavities(albedo=colour(dtype), slope=number(0.8, dtype), order=4),
+        captured=False,
+        integral=KINKED,
+        float32=STEEP,
+    ),
+    Model(
+        "closed-form single slope",
+        lambda dtype: ClosedFormVCavities(albedo=colour(dtype), slope=number(0.8, dtype)),
+        captured=False,
+        integral=KINKED,
+        float32=STEEP,
+    ),
+    Model(
+        "grooves",
+        lambda dtype: Brushed(UnidirectionalVCavities(albedo=colour(dtype), slope=number(0.8, dtype)), dtype),
+        isotropic=False,
+        integral=KINKED,
+        float32=STEEP,
+    ),
+    Model(
+        "grooves, white, all bounces",
+        lambda dtype: Brushed(
+            UnidirectionalVCavities(
+                albedo=fixed(number(1.0, dtype)), slope=fixed(number(1.1, dtype)), bounces="all", modes=6
+            ),
+            dtype,
+        ),
+        captured=False,
+        isotropic=False,
+        integral=KINKED,
+        float32=MODAL,
+    ),
+    Model(
+        "anisotropic rough surface",
+        lambda dtype: Brushed(
+            AnisotropicRoughSurface(
+                albedo=colour(dtype), sigma_x=number(0.3, dtype), sigma_y=number(0.7, dtype), nodes=3, azimuths=4
+            ),
+            dtype,
+        ),
+        captured=False,
+        isotropic=False,
+        integral=KINKED,
+        float32=STEEP,
+    ),
 ]

@@ -10,14 +10,18 @@ Conventions, stated once:
 - Below the horizon f_r is 0 with zero gradient.
 """
 
-from torchbrdf.brdf import BRDF, LinearBRDF, WeightedSum
+from torchbrdf.brdf import BRDF, ImageBRDF, LinearBRDF, WeightedSum
 from torchbrdf.directions import Cosines
 from torchbrdf.models.lambert import Lambert
+from torchbrdf.models.oren_nayar.anisotropic import AnisotropicRoughSurface
 from torchbrdf.models.oren_nayar.functional import OrenNayar, oren_nayar
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar, qualitative
+from torchbrdf.models.oren_nayar.rough_surface import ClosedFormRoughSurface, RoughSurface, TabulatedRoughSurface
+from torchbrdf.models.oren_nayar.single_slope import ClosedFormVCavities, SingleSlopeVCavities, UnidirectionalVCavities
 from torchbrdf.parameters import (
     Constrained,
     Interval,
+    Simplex,
     fixed,
     is_per_texel,
     sigma_from_beckmann_alpha,
@@ -25,23 +29,37 @@ from torchbrdf.parameters import (
     sigma_from_mean_slope,
     trainable,
 )
+from torchbrdf.slopes import gaussian_weights, sample_slope, shared_slopes, tabulated_weights
 
-__all__ = [
+__all__ = [  # noqa: RUF022 - in plain order
+    "AnisotropicRoughSurface",
     "BRDF",
+    "ClosedFormRoughSurface",
+    "ClosedFormVCavities",
     "Constrained",
     "Cosines",
+    "ImageBRDF",
     "Interval",
     "Lambert",
     "LinearBRDF",
     "OrenNayar",
     "QualitativeOrenNayar",
+    "RoughSurface",
+    "Simplex",
+    "SingleSlopeVCavities",
+    "TabulatedRoughSurface",
+    "UnidirectionalVCavities",
     "WeightedSum",
     "fixed",
+    "gaussian_weights",
     "is_per_texel",
     "oren_nayar",
     "qualitative",
+    "sample_slope",
+    "shared_slopes",
     "sigma_from_beckmann_alpha",
     "sigma_from_degrees",
     "sigma_from_mean_slope",
+    "tabulated_weights",
     "trainable",
 ]

@@ -2,7 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import torch
@@ -13,6 +13,8 @@ from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
 from torchbrdf.parameters import WEIGHT, Constrained, declared
 
+PIXELS_AT_A_TIME = 4096
+
 
 class BRDF(nn.Module, ABC):
     """Bidirectional reflectance distribution function f_r [1/sr], cosine not included.
@@ -21,17 +23,22 @@ class BRDF(nn.Module, ABC):
     `0.7 * OrenNayar() + 0.3 * Lambert()` has two trainable weights.
     """
 
-    def forward(self, normal: Tensor, light: Tensor, view: Tensor, *, normalize: bool = False) -> Tensor:
+    def forward(
+        self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
+    ) -> Tensor:
         """f_r (..., channel) [1/sr] for unit vectors (..., 3) that leave the surface.
 
         Zero, with zero gradient, unless light and view are both above the horizon. Raises what
-        `Cosines.of` raises; `normalize=True` scales the vectors to unit length first.
+        `Cosines.of` raises; `normalize=True` scales the vectors to unit length first. Anisotropic
+        models need a tangent (..., 3); the others ignore it.
         """
-        return self.evaluate(Cosines.of(normal, light, view, normalize=normalize))
+        return self.evaluate(Cosines.of(normal, light, view, tangent=tangent, normalize=normalize))
 
-    def components(self, normal: Tensor, light: Tensor, view: Tensor, *, normalize: bool = False) -> dict[str, Tensor]:
+    def components(
+        self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
+    ) -> dict[str, Tensor]:
         """The named parts (..., channel) [1/sr] whose sum is `forward`."""
-        cosines = Cosines.of(normal, light, view, normalize=normalize)
+        cosines = Cosines.of(normal, light, view, tangent=tangent, normalize=normalize)
         parts = self.evaluate_components(cosines)
         return {name: cosines.zero_below_horizon(part) for name, part in parts.items()}
 
@@ -118,6 +125,48 @@ class LinearBRDF(BRDF):
         return {name: _contract(c, terms) for name, c in self.component_coefficients().items()}
 
 
+class ImageBRDF(LinearBRDF):
+    """A `LinearBRDF` of many terms, made and contracted as one tensor, some pixels at a time.
+
+    A model states what its images read of the directions and what they are. Working memory without
+    derivatives is that of `PIXELS_AT_A_TIME` pixels, plus K numbers a pixel where `basis` is asked for.
+    """
+
+    @abstractmethod
+    def coordinates(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        """What the images read of the directions, each (...)."""
+
+    @abstractmethod
+    def images(self, *coordinates: Tensor) -> Tensor:
+        """The terms (..., K) at coordinates (...); finite, but arbitrary below the horizon."""
+
+    def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        return _in_pieces(self.images, self.coordinates(cosines)).unbind(-1)
+
+    def basis(self, cosines: Cosines) -> Tensor:
+        return cosines.zero_below_horizon(_in_pieces(self.images, self.coordinates(cosines)))
+
+    def evaluate(self, cosines: Cosines) -> Tensor:
+        return cosines.zero_below_horizon(self._seen_by(self.coefficients(), cosines))
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        coefficients = self.component_coefficients()
+        together = torch.cat(list(coefficients.values()), -2)
+        channels = [c.shape[-2] for c in coefficients.values()]
+        parts = self._seen_by(together, cosines).split(channels, -1)
+        return dict(zip(coefficients, parts, strict=True))
+
+    def _seen_by(self, coefficients: Tensor, cosines: Cosines) -> Tensor:
+        """Images times coefficients (..., channel, K), without keeping the images."""
+        coordinates = self.coordinates(cosines)
+        if coefficients.ndim == 2:
+            return _in_pieces(lambda *c: self.images(*c) @ coefficients.mT, coordinates)
+        shape = torch.broadcast_shapes(coordinates[0].shape, coefficients.shape[:-2])
+        rows = coefficients.expand(*shape, *coefficients.shape[-2:])
+        wide = tuple(c.expand(shape) for c in coordinates)
+        return _in_pieces(lambda row, *c: torch.einsum("...k,...ck->...c", self.images(*c), row), (rows, *wide))
+
+
 class WeightedSum(BRDF):
     """Sum of BRDFs with trainable positive weights (part,). Components are named `Model.part`.
 
@@ -167,6 +216,15 @@ class WeightedSum(BRDF):
 def _contract(coefficients: Tensor, terms: tuple[Tensor, ...]) -> Tensor:
     """sum_k coefficients[..., k] * terms[k] (..., channel), without stacking the terms."""
     return _sum([c * t[..., None] for c, t in zip(coefficients.unbind(-1), terms, strict=True)])
+
+
+def _in_pieces(compute: Callable[..., Tensor], inputs: tuple[Tensor, ...]) -> Tensor:
+    """compute(*inputs) over many pixels, some at a time; the last input's shape (...) leads in all of them."""
+    shape = inputs[-1].shape
+    if torch.compiler.is_compiling() or shape.numel() <= PIXELS_AT_A_TIME:
+        return compute(*inputs)
+    pieces = zip(*(t.flatten(0, len(shape) - 1).split(PIXELS_AT_A_TIME) for t in inputs), strict=True)
+    return torch.cat([compute(*piece) for piece in pieces]).unflatten(0, shape)
 
 
 def _sum(values) -> Tensor:

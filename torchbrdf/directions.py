@@ -1,7 +1,8 @@
 """Directions at a surface point, reduced to the three cosines every isotropic model reads."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -9,6 +10,7 @@ from torch import Tensor
 from torchbrdf._numerics import (
     SUPPORTED_DTYPES,
     angle_over_sine,
+    cross,
     dot,
     holds,
     horizon,
@@ -18,14 +20,23 @@ from torchbrdf._numerics import (
 )
 
 
+class TangentPlane(NamedTuple):
+    """Components of light and view along the tangent t and the bitangent b = normal x t, each (...). [-]"""
+
+    light_tangent: Tensor
+    light_bitangent: Tensor
+    view_tangent: Tensor
+    view_bitangent: Tensor
+
+
 class _computed_once:  # noqa: N801 - used as a decorator
     """`functools.cached_property` without the lock that torch.compile cannot enter."""
 
-    def __init__(self, compute: "Callable[[Cosines], Tensor]"):
+    def __init__(self, compute: "Callable[[Cosines], Any]"):
         self.compute = compute
         self.name = compute.__name__
 
-    def __get__(self, instance: "Cosines", owner: type) -> Tensor:
+    def __get__(self, instance: "Cosines", owner: type) -> Any:
         value = self.compute(instance)
         instance.__dict__[self.name] = value  # found before this descriptor from now on
         return value
@@ -46,19 +57,27 @@ class Cosines:
         view: normal . view (...). [-]
         phase: light . view (...). [-]
         above_horizon: where both light and view are above the horizon (...).
+        vectors: normal, light and view (..., 3) themselves, if known: for what is computed on demand.
+        tangent: of the surface (..., 3), if given; not orthonormalised yet.
     """
 
     light: Tensor
     view: Tensor
     phase: Tensor
     above_horizon: Tensor
+    vectors: tuple[Tensor, Tensor, Tensor] | None = None
+    tangent: Tensor | None = None
 
     @classmethod
-    def of(cls, normal: Tensor, light: Tensor, view: Tensor, *, normalize: bool = False) -> "Cosines":
+    def of(
+        cls, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
+    ) -> "Cosines":
         """Cosines of directions (..., 3) that leave the surface; leading shapes broadcast.
 
         Args:
             normal, light, view: unit vectors (..., 3), float32 or float64, all of one dtype.
+            tangent: vectors (..., 3) in no direction parallel to the normal, for anisotropic models: of each,
+                the part along the surface counts, scaled to unit length. Isotropic models ignore it.
             normalize: scale the vectors to unit length instead of refusing others.
         Raises:
             TypeError: a dtype other than float32 and float64 (half types lose up to 20 % at grazing
@@ -67,14 +86,15 @@ class Cosines:
                 are not finite, or vectors that are not of unit length.
         """
         vectors = {"normal": normal, "light": light, "view": view}
-        _check_shapes(vectors)
+        _check_shapes(vectors if tangent is None else vectors | {"tangent": tangent})
         if normalize:
             vectors = {name: _normalized(name, v) for name, v in vectors.items()}
         else:
             for name, v in vectors.items():
                 _check_unit(name, v)
         n, s, v = vectors.values()
-        return cls.from_products(dot(n, s), dot(n, v), dot(s, v))
+        found = cls.from_products(dot(n, s), dot(n, v), dot(s, v))
+        return replace(found, vectors=(n, s, v), tangent=tangent)
 
     @classmethod
     def from_products(cls, light: Tensor, view: Tensor, phase: Tensor) -> "Cosines":
@@ -88,6 +108,46 @@ class Cosines:
     def zero_below_horizon(self, brdf: Tensor) -> Tensor:
         """brdf (..., channel) where light and view are above the horizon, else 0 with zero gradient."""
         return brdf.masked_fill(~self.above_horizon[..., None], 0.0)
+
+    @_computed_once
+    def azimuth_sine(self) -> Tensor:
+        """sin(alpha) sin(beta) |sin(dphi)| (...): |normal . (light x view)|; zero subgradient where it is 0.
+
+        From the vectors where they are known, else as the root of a determinant that loses half the
+        digits where it is small.
+        """
+        if self.vectors is not None:
+            n, s, v = self.vectors
+            volume = dot(n, cross(s, v)).masked_fill(~self.above_horizon, 0.0)
+            return volume.abs()
+        squares = self.light * self.light + self.view * self.view + self.phase * self.phase
+        return safe_sqrt(1 - squares + 2 * self.light * self.view * self.phase)
+
+    @_computed_once
+    def tangent_plane(self) -> TangentPlane:
+        """Components of light and view along tangent and bitangent; 0 below the horizon.
+
+        Raises ValueError where no tangent was given, or where it is parallel to the normal.
+        """
+        if self.vectors is None or self.tangent is None:
+            raise ValueError(
+                "an anisotropic model needs a tangent: pass tangent=(..., 3), a direction along the surface, "
+                "to the model or to Cosines.of. Its directional albedo depends on the azimuth and is not defined."
+            )
+        normal, *directions = self.vectors
+        bitangent = cross(normal, _normalized("tangent", self.tangent))
+        squared = dot(bitangent, bitangent)
+        parallel = squared <= unit_tolerance(squared.dtype) ** 2
+        if not holds(~parallel):
+            raise ValueError(
+                f"tangent must not be parallel to the normal; {int(parallel.sum())} of {parallel.numel()} are. "
+                "Choose a direction along the surface."
+            )
+        bitangent = bitangent / squared.sqrt()[..., None]
+        tangent = cross(bitangent, normal)
+        below = ~self.above_horizon
+        parts = [dot(along, direction) for direction in directions for along in (tangent, bitangent)]
+        return TangentPlane(*(part.masked_fill(below, 0.0) for part in parts))
 
     @_computed_once
     def alpha(self) -> Tensor:
@@ -146,13 +206,18 @@ def _check_shapes(vectors: dict[str, Tensor]) -> None:
             raise ValueError(f"{name} must have shape (..., 3); found {tuple(v.shape)}.")
     if len({v.dtype for v in vectors.values()}) > 1:
         found = ", ".join(f"{name} {v.dtype}" for name, v in vectors.items())
-        raise TypeError(f"normal, light and view must share one dtype; found {found}.")
+        raise TypeError(f"{_listed(vectors)} must share one dtype; found {found}.")
     shapes = [v.shape for v in vectors.values()]
     try:
         torch.broadcast_shapes(*shapes)
     except RuntimeError:
         found = ", ".join(f"{name} {tuple(v.shape)}" for name, v in vectors.items())
-        raise ValueError(f"normal, light and view must broadcast; found {found}.") from None
+        raise ValueError(f"{_listed(vectors)} must broadcast; found {found}.") from None
+
+
+def _listed(vectors: dict[str, Tensor]) -> str:
+    *names, last = vectors
+    return f"{', '.join(names)} and {last}"
 
 
 def _check_unit(name: str, v: Tensor) -> None:

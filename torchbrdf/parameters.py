@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import overload
+from typing import ClassVar, overload
 
 import torch
 from torch import Tensor, nn
 
-from torchbrdf._numerics import SUPPORTED_DTYPES, holds
+from torchbrdf._numerics import SUPPORTED_DTYPES, holds, unit_tolerance
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,43 @@ class Interval:
         return (self.low + inside).reshape(raw.shape)
 
 
+@dataclass(frozen=True)
+class Simplex:
+    """Domain of shares: entries >= 0 that sum to 1 along the last axis.
+
+    A trained value has all entries above 0. Its raw form (..., K - 1) is the logarithms of their ratios
+    to the last entry, read back by softmax.
+    """
+
+    low: ClassVar[float] = 0.0
+    high: ClassVar[float] = 1.0
+    unit: ClassVar[str] = ""
+    even: ClassVar[bool] = False
+    trailing: ClassVar[int] = 1
+
+    def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
+        """Raise ValueError unless the entries are shares (all above 0 if `open_ends`)."""
+        if value.ndim == 0:
+            raise ValueError(f"{name} must hold shares along its last axis; found a single number.")
+        total = value.sum(-1)
+        sums_to_one = (total - 1).abs() <= unit_tolerance(value.dtype)
+        inside = ((value > 0) if open_ends else (value >= 0)).all(-1) & sums_to_one
+        if not holds(inside):
+            remedy = " A trained share cannot be 0: hold it with fixed(...)." if open_ends else ""
+            raise ValueError(
+                f"{name} must hold shares {'above' if open_ends else 'of at least'} 0 that sum to 1; "
+                f"found min {value.min():.6g}, sums from {total.min():.9g} to {total.max():.9g}.{remedy}"
+            )
+
+    def to_raw(self, value: Tensor) -> Tensor:
+        """Unconstrained coordinate of a value inside the domain."""
+        return (value[..., :-1] / value[..., -1:]).log()
+
+    def from_raw(self, raw: Tensor) -> Tensor:
+        """Value inside the domain for any real numbers."""
+        return torch.cat((raw, torch.zeros_like(raw[..., :1])), -1).softmax(-1)
+
+
 ALBEDO = Interval(0.0, 1.0, trailing=1)
 ROUGHNESS = Interval(0.0, math.pi / 2, "rad", even=True)
 WEIGHT = Interval(0.0, math.inf, trailing=1)
@@ -81,7 +118,7 @@ class Constrained:
     `fixed(value)` stores the value as the buffer `fixed_<name>`. Reading gives the constrained value.
     """
 
-    def __init__(self, domain: Interval):
+    def __init__(self, domain: Interval | Simplex):
         self.domain = domain
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -137,7 +174,7 @@ def declared(module: nn.Module) -> Iterator[Constrained]:
         yield from (entry for entry in vars(owner).values() if isinstance(entry, Constrained))
 
 
-def trainable(module: nn.Module) -> dict[str, tuple[str, Interval]]:
+def trainable(module: nn.Module) -> dict[str, tuple[str, Interval | Simplex]]:
     """Trained parameters of a module and its children: readable path -> (path of the raw one, domain)."""
     found = {}
     for prefix, child in module.named_modules():
