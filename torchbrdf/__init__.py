@@ -14,6 +14,7 @@ from torchbrdf.brdf import BRDF, ImageBRDF, LinearBRDF, WeightedSum
 from torchbrdf.directions import Cosines
 from torchbrdf.models.lambert import Lambert
 from torchbrdf.models.oren_nayar.anisotropic import AnisotropicRoughSurface
+from torchbrdf.models.oren_nayar.fast import FastRoughSurface, fast_rough_surface
 from torchbrdf.models.oren_nayar.functional import OrenNayar, oren_nayar
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar, qualitative
 from torchbrdf.models.oren_nayar.rough_surface import ClosedFormRoughSurface, RoughSurface, TabulatedRoughSurface
@@ -38,6 +39,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "ClosedFormVCavities",
     "Constrained",
     "Cosines",
+    "FastRoughSurface",
     "ImageBRDF",
     "Interval",
     "Lambert",
@@ -50,6 +52,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "TabulatedRoughSurface",
     "UnidirectionalVCavities",
     "WeightedSum",
+    "fast_rough_surface",
     "fixed",
     "gaussian_weights",
     "is_per_texel",
