@@ -61,17 +61,15 @@ def main() -> None:
 
     print("\nCross-section of the belly (position -1 at the left limb, +1 at the right):")
     for k, angle in enumerate((0, 20)):
-        position, seen = cross_section(photographs[k], surface)
-        brightest = peak_position(*cross_section(photographs[k], surface, rows=args.size // 16))
+        rows = args.size // 16  # averaged, so that the noise does not choose the brightest place
+        position, seen = cross_section(photographs[k], surface, rows=rows)
+        brightest = peak_position(position, seen)
         print(f"  light {angle} deg: photograph brightest at {brightest:+.2f}, {at_limb(position, seen)}")
         for name, images in renderings.items():
-            _, values = cross_section(images[k], surface)
-            displaced = peak_position(position, values) - brightest
+            _, values = cross_section(images[k], surface, rows=rows)
             rms = ((values - seen) ** 2).mean() ** 0.5 / seen.max()
-            print(
-                f"    {name:<10} peak displaced by {displaced:+.2f}, {at_limb(position, values)}, "
-                f"rms over the section {rms:.1%} of the peak"
-            )
+            displaced = f"peak displaced by {peak_position(position, values) - brightest:+.2f}, " if angle else ""
+            print(f"    {name:<10} {displaced}{at_limb(position, values)}, rms over the section {rms:.1%} of the peak")
 
     args.output.mkdir(parents=True, exist_ok=True)
     title = (

@@ -84,9 +84,8 @@ def main() -> None:
     machine = f"{name}, {torch.get_num_threads()} threads, float32, {kind}, torch {torch.__version__}"
     rows = [asdict(row) | vases[row.name] for row in table.rows]
     print(f"{machine}\n\n{table.to_markdown()}\n")
-    print(
-        "| rung | error of the vase image, max, of peak | bias of sigma, max [deg] | bias of rho, max |\n|---|---|---|---|"
-    )
+    print("| rung | max error of the vase image, of peak | max bias of sigma [deg] | max bias of rho |")
+    print("|---|---|---|---|")
     for row in rows:
         print(f"| {row['name']} | {row['image_error']:.2%} | {row['sigma_bias']:.2f} | {row['rho_bias']:.4f} |")
     args.output.mkdir(parents=True, exist_ok=True)

@@ -49,7 +49,8 @@ def curves() -> dict[str, tuple[str, list]]:
             ("with interreflection", rough(30, 0.9), 75, 0, "-"), ("without", rough(30, 0.9, 1), 75, 0, "--")]),
         "figure_09": ("rho 0.9, light at 75 deg", [
             (f"sigma {s} deg", rough(s, 0.9), 75, 0, "-") for s in (0, 10, 20, 40)]),
-        "figure_10": ("sigma 40 deg, rho 0.9", [(f"light at {t} deg", rough(40, 0.9), t, 0, "-") for t in (0, 30, 60, 75)]),
+        "figure_10": ("sigma 40 deg, rho 0.9", [
+            (f"light at {t} deg", rough(40, 0.9), t, 0, "-") for t in (0, 30, 60, 75)]),
         "figure_11": ("sigma 40 deg, rho 0.9, light at 75 deg", [
             (f"azimuth {d} deg", rough(40, 0.9), 75, d, "-") for d in (0, 60, 90)]),
         "figure_12": ("integral and functional approximation, sigma 30 deg, rho 0.9", [
@@ -86,7 +87,7 @@ def main() -> None:
             values = radiance(model, theta_i, dphi, theta_r)
             if "over its value" in title:
                 values = values / radiance(model, theta_i, dphi, torch.zeros(1))
-            axis.plot(theta_r, values, style, label=label)
+            axis.plot(theta_r.numpy(), values.numpy(), style, label=label)
         axis.set_title(title, fontsize=10)
         axis.set(xlabel="viewing angle [deg], light's side positive", ylabel="radiance", xlim=(-90, 90))
         axis.set_ylim(bottom=0)
@@ -99,7 +100,7 @@ def main() -> None:
     figure, axes = plt.subplots(1, 4, figsize=(10, 2.9), layout="constrained")
     for axis, sigma in zip(axes, (0, 10, 20, 40), strict=True):
         image = render(Scene(sphere(n, n, samples=2), [straight]), rough(sigma, 0.9, nodes=16))[0, :, :, 0]
-        axis.imshow(image / image.max(), cmap="gray", vmin=0)
+        axis.imshow((image / image.max()).numpy(), cmap="gray", vmin=0)
         axis.set(title=f"sigma {sigma} deg")
         axis.set_axis_off()
     save(figure, args.output / "spheres.png")
@@ -111,7 +112,7 @@ def main() -> None:
         (0, oblique, "smooth, light at 20 deg"), (30, oblique, "sigma 30 deg, light at 20 deg"),
     ), strict=True):  # fmt: skip
         image = render(Scene(side_by_side(objects), [light]), rough(sigma, 0.9, nodes=16))[0, :, :, 0]
-        axis.imshow(image, cmap="gray", vmin=0, vmax=0.9 / math.pi)
+        axis.imshow(image.numpy(), cmap="gray", vmin=0, vmax=0.9 / math.pi)
         axis.set(title=label)
         axis.set_axis_off()
     save(figure, args.output / "scene.png")

@@ -18,7 +18,7 @@ from torchbrdf.models.lambert import Lambert
 from torchbrdf.models.oren_nayar.fast import FastRoughSurface
 from torchbrdf.models.oren_nayar.functional import OrenNayar
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
-from torchbrdf.models.oren_nayar.rough_surface import ClosedFormRoughSurface, RoughSurface
+from torchbrdf.models.oren_nayar.rough_surface import BounceCount, ClosedFormRoughSurface, RoughSurface
 
 Build = Callable[[Tensor, Tensor], BRDF]
 
@@ -32,6 +32,13 @@ class Rung:
     points: int = 1 << 17
 
 
+_BOUNCES: tuple[tuple[BounceCount, str], ...] = ((1, "1 bounce"), (2, "2 bounces"), ("all", "all bounces"))
+
+
+def _exact(nodes: int, bounces: BounceCount) -> Build:
+    return lambda albedo, sigma: RoughSurface(albedo=albedo, sigma=sigma, nodes=nodes, bounces=bounces)
+
+
 RUNGS = (
     Rung("Lambert", lambda albedo, sigma: Lambert(albedo=albedo)),
     Rung("qualitative (0.33)", lambda albedo, sigma: QualitativeOrenNayar(albedo=albedo, sigma=sigma)),
@@ -43,20 +50,18 @@ RUNGS = (
     *(
         Rung(
             f"exact, K = {nodes}, {label}",
-            lambda albedo, sigma, nodes=nodes, bounces=bounces: RoughSurface(
-                albedo=albedo, sigma=sigma, nodes=nodes, bounces=bounces
-            ),
+            _exact(nodes, bounces),
             1 << 12,
         )
         for nodes in (4, 8, 16, 48)
-        for bounces, label in ((1, "1 bounce"), (2, "2 bounces"), ("all", "all bounces"))
+        for bounces, label in _BOUNCES
     ),
 )
 
 
 def reference(albedo: Tensor, sigma: Tensor) -> RoughSurface:
-    """The top of the ladder: 96 slopes, all bounces; within 1e-4 of `converged` up to 85 degrees, sigma >= 5 degrees."""
-    return RoughSurface(albedo=albedo, sigma=sigma, nodes=96, order=8, bounces="all", modes=8)
+    """The top of the ladder: 64 slopes, all bounces, graded azimuths."""
+    return RoughSurface(albedo=albedo, sigma=sigma, nodes=64, order=6, graded=True, bounces="all", modes=8)
 
 
 @dataclass(frozen=True)

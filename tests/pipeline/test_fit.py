@@ -11,7 +11,6 @@ from torchbrdf import (
     Lambert,
     OrenNayar,
     QualitativeOrenNayar,
-    TabulatedRoughSurface,
     fixed,
     sigma_from_degrees,
     trainable,
@@ -296,17 +295,3 @@ def test_bootstrap_sees_a_light_that_is_wrong():
         bootstrap(believed, photographs, OrenNayar(), samples=1)
     with pytest.raises(ValueError, match="at least 3; found 2"):
         bootstrap(Scene(surface, believed.lights[:2]), photographs[:2], OrenNayar(), samples=3)
-
-
-def test_slope_distribution_is_recovered_without_assuming_a_gaussian():
-    shares = torch.tensor([0.1, 0.3, 0.4, 0.15, 0.05], dtype=DOUBLE)
-    lights = [Distant.from_angle(a) for a in (-60, -30, 0, 30, 60)]
-    scene = Scene(sphere(32, 32, dtype=DOUBLE), lights, Sensor(exposure=2.0, read_noise=1e-4))
-    rho = fixed(torch.tensor(0.8, dtype=DOUBLE))
-    photographs = photographed(scene, TabulatedRoughSurface(albedo=rho, weights=fixed(shares)))
-    start = TabulatedRoughSurface(albedo=rho, weights=torch.full((5,), 0.2, dtype=DOUBLE))
-    found = fit(scene, photographs, start, valid=photographs[..., 0] > 0.02)
-    z = (found.parameters["weights"] - shares) / found.standard_error["weights"]
-    assert found.parameters["weights"].sum().item() == pytest.approx(1)
-    assert z.abs().max() < 4
-    assert found.standard_error["weights"].max() < 0.05

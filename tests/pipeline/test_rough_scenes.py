@@ -1,9 +1,12 @@
-"""Pictures of rough objects flatten, as the paper's spheres and three-object scene do."""
+"""Pictures of rough objects flatten, as the paper's do, and their slopes can be read from photographs."""
 
+import pytest
 import torch
 
-from inverse import Distant, Scene, cuboid, render, sphere
-from torchbrdf import RoughSurface, fixed, sigma_from_degrees
+from inverse import Distant, Scene, Sensor, cuboid, fit, render, sphere
+from torchbrdf import RoughSurface, TabulatedRoughSurface, fixed, sigma_from_degrees
+
+DOUBLE = torch.float64
 
 
 def rough(degrees):
@@ -32,3 +35,18 @@ def test_contrast_between_the_faces_of_a_cube_shrinks():
             bright, dark = sorted((face.mean().item() for face in faces), reverse=True)
             contrast.append((bright - dark) / (bright + dark))
         assert contrast[1] < contrast[0]
+
+
+def test_slope_distribution_is_recovered_without_assuming_a_gaussian():
+    shares = torch.tensor([0.1, 0.3, 0.4, 0.15, 0.05], dtype=DOUBLE)
+    lights = [Distant.from_angle(a) for a in (-60, -30, 0, 30, 60)]
+    scene = Scene(sphere(32, 32, dtype=DOUBLE), lights, Sensor(exposure=2.0, read_noise=1e-4))
+    rho = fixed(torch.tensor(0.8, dtype=DOUBLE))
+    truth = TabulatedRoughSurface(albedo=rho, weights=fixed(shares))
+    photographs = scene.sensor.expose(render(scene, truth), torch.Generator().manual_seed(0))
+    start = TabulatedRoughSurface(albedo=rho, weights=torch.full((5,), 0.2, dtype=DOUBLE))
+    found = fit(scene, photographs, start, valid=photographs[..., 0] > 0.02)
+    z = (found.parameters["weights"] - shares) / found.standard_error["weights"]
+    assert found.parameters["weights"].sum().item() == pytest.approx(1)
+    assert z.abs().max() < 4
+    assert found.standard_error["weights"].max() < 0.05

@@ -10,7 +10,7 @@ from torchbrdf import Cosines, RoughSurface, fixed, sigma_from_degrees
 DOUBLE = torch.float64
 
 
-def radiance(sigma, rho, theta_i, theta_r, dphi=0.0, bounces=2):
+def radiance(sigma, rho, theta_i, theta_r, *, dphi=0.0, bounces=2):
     """Radiance for irradiance 1; angles in degrees, theta_r positive on the light's side."""
     model = RoughSurface(
         albedo=fixed(torch.tensor(rho, dtype=DOUBLE)),
