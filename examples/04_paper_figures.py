@@ -1,12 +1,13 @@
 """The figures of Oren and Nayar's paper: radiance against viewing angle, spheres, and a scene of three objects.
 
-"integral" is the numerical model (two bounces, 48 slopes) that the approximations stand for. Radiances
+"integral" is the numerical model (two bounces, 32 slopes) that the approximations stand for. Radiances
 are for an irradiance of 1; positive viewing angles are on the light's side.
 """
 
 import argparse
 import math
 from pathlib import Path
+from typing import Literal
 
 import matplotlib
 import matplotlib.pyplot as plt
@@ -25,9 +26,9 @@ SAMPLES = {  # figure: sample, sigma [deg], rho, (theta_i, dphi) [deg]
 }
 
 
-def rough(sigma: float, rho: float, bounces: int = 2, nodes: int = 48) -> BRDF:
+def rough(sigma: float, rho: float, bounces: Literal[1, 2] = 2, nodes: int = 32) -> BRDF:
     material = {"albedo": fixed(rho), "sigma": fixed(sigma_from_degrees(sigma))}
-    return RoughSurface(**material, nodes=nodes, order=8, bounces=bounces)
+    return RoughSurface(**material, nodes=nodes, order=5, bounces=bounces)
 
 
 def approximation(cls, sigma: float, rho: float) -> BRDF:
@@ -106,7 +107,7 @@ def main() -> None:
     save(figure, args.output / "spheres.png")
 
     objects = [vase(n, n, samples=2), cylinder(n, n, half_height=0.6, samples=2), cuboid(n, n, samples=2)]
-    figure, axes = plt.subplots(2, 2, figsize=(12, 8.4), layout="constrained")
+    figure, axes = plt.subplots(2, 2, figsize=(12, 4.6), layout="constrained")
     for axis, (sigma, light, label) in zip(axes.flat, (
         (0, straight, "smooth, light from the viewer"), (30, straight, "sigma 30 deg, light from the viewer"),
         (0, oblique, "smooth, light at 20 deg"), (30, oblique, "sigma 30 deg, light at 20 deg"),
