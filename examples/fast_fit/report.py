@@ -11,16 +11,18 @@ from reference import Sample, directions, exact
 from torch import Tensor
 
 from torchbrdf import FastRoughSurface, fast_rough_surface, fixed
+from torchbrdf.models.oren_nayar.fast import Bounces
 
 DEGREES = (0.7, 2.5, 5, 7, 11, 15, 21, 28, 36, 45, 52, 60)  # none of them fitted but 5 and 60
 ALBEDOS = (0.3, 0.5, 0.7, 0.9, 1.0)
 COUNT = 3000
 TOP = 85.0  # degrees
 STEP = 1e-4  # [rad] of the central difference by sigma
+BOUNCES: tuple[Bounces, ...] = (2, "all")
 DERIVED = (5, 10, 20, 30, 40, 50, 60)  # degrees
 
 
-def relative_errors(sample: Sample, bounces) -> Tensor:
+def relative_errors(sample: Sample, bounces: Bounces) -> Tensor:
     """Fit over exact less 1, (P, S, R). [%]"""
     rho = torch.tensor(ALBEDOS, dtype=torch.float64)
     cosines = sample.angles.cosines()
@@ -35,7 +37,7 @@ def rms(error: Tensor) -> Tensor:
 def print_values(label: str, seed: int, *, edges: bool) -> None:
     sigmas = torch.deg2rad(torch.tensor(DEGREES, dtype=torch.float64))
     sample = exact(directions(seed, COUNT, TOP, edges=edges), sigmas, albedos=ALBEDOS)
-    errors = {bounces: relative_errors(sample, bounces) for bounces in (2, "all")}
+    errors = {bounces: relative_errors(sample, bounces) for bounces in BOUNCES}
     print(f"\n{label}: max/rms % at rho = {ALBEDOS} | two bounces || all bounces")
     for k, degrees in enumerate(DEGREES):
         cells = [" ".join(f"{e.abs().max():.2f}/{rms(e):.3f}" for e in error[:, k].T) for error in errors.values()]
@@ -54,14 +56,14 @@ def print_derivatives(seed: int) -> None:
     print("\nderivative by sigma: rms % of its own rms at the same rho | two bounces || all bounces")
     for k, degrees in enumerate(DERIVED):
         cells = []
-        for bounces in (2, "all"):
+        for bounces in BOUNCES:
             total = sample.total(rho, bounces)
             expected = (total[:, k + count] - total[:, k]) / (2 * STEP)
 
-            def value(sigma: Tensor, bounces=bounces) -> Tensor:
+            def value(sigma: Tensor, bounces: Bounces = bounces) -> Tensor:
                 return math.pi * fast_rough_surface(cosines, albedo=rho, sigma=sigma, bounces=bounces)
 
-            _, found = torch.func.jvp(value, (sigmas[k],), (torch.ones_like(sigmas[k]),))
+            found = torch.func.jvp(value, (sigmas[k],), (torch.ones_like(sigmas[k]),))[1]
             ratios = (found - expected).square().mean(0).sqrt() / expected.square().mean(0).sqrt()
             cells.append(" ".join(f"{100 * r:.1f}" for r in ratios))
         print(f"{degrees:5.1f}  {cells[0]}  ||  {cells[1]}")

@@ -112,7 +112,8 @@ def _components(cosines: Cosines, albedo: Tensor, sigma: Tensor, bounces: Bounce
 
 def _polynomials(r: Ring, sigma: Tensor, bounces: Bounces) -> dict[str, Tensor]:
     """p_d, p_i and, for all bounces, g_0, g_1, each (...)."""
-    x = knee(sigma)
+    # At least 1-D: forward differentiation of "number * 0-d float32 tensor" yields float64.
+    x = knee(torch.atleast_1d(sigma))
     length = len(_FIT.series["direct"][0])
     row = chebyshev(x, length)
     names = _PARTS[bounces]
@@ -122,7 +123,7 @@ def _polynomials(r: Ring, sigma: Tensor, bounces: Bounces) -> dict[str, Tensor]:
     else:
         powers = torch.stack((*row, *(x * t for t in row), *(x * x * t for t in row)), dim=-1)
         count = sum(len(_FIT.terms[n]) for n in names)
-        columns = iter((powers @ _FIT.table[:count].to(sigma).T).unbind(-1))
+        columns = iter((powers @ _FIT.table[:count].to(sigma).T).reshape(*sigma.shape, count).unbind(-1))
         weights = {n: [next(columns) for _ in _FIT.terms[n]] for n in names}
     return {n: contract(r, _FIT.terms[n], weights[n]) for n in names}
 
