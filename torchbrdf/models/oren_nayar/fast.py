@@ -17,7 +17,7 @@ Bounces = Literal[2, "all"]
 
 
 class _Fit(NamedTuple):
-    """Numbers of `fast_rough_surface.json` (made by `fit_fast_rough_surface.py`)."""
+    """Numbers of `fast_rough_surface.json` (made by `examples/fast_fit`)."""
 
     terms: dict[str, list[Term]]
     orders: dict[str, list[int]]  # power of x in front of each series
@@ -70,12 +70,13 @@ def fast_rough_surface(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, bounc
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo or sigma leave their domains, or for other bounces.
     Deviations: a fit. Up to 85 degrees, sigma up to 60 degrees and rho 0.3 to 0.9, on directions it was not fitted
-        to: rms 0.18 % (two bounces) and 0.23 % (all), at most 2.8 % and 2.9 % of the total (worst at sigma = 60
-        degrees: rms 0.39 % and 0.64 % at rho = 0.9). At rho = 1 with all bounces up to 12 % (rms 1.4 %), and the
-        directional albedo is within 1.7 % of 1. The derivative by sigma errs by 1-4 % rms (two bounces) and 1-8 %
-        (all, worst at 60 degrees). Beyond 86 degrees: bounded f cos, no figures. At light = view, a cone of the exact
-        reflectance, the subgradient is 0.
-    Source: fitted here to the exact model (`examples/fit_fast_rough_surface.py`); small-sigma form from the expansion
+        to: rms 0.17 % (two bounces) and 0.22 % (all), 0.18 % and 0.25 % where half of them crowd in the plane of
+        incidence, at light = view and at grazing; at most 2.8 % and 3.0 % of the total. Worst at sigma = 60 degrees
+        and rho = 0.9: rms 0.39 % and 0.64 %. At rho = 1 with all bounces up to 14 % (rms 0.7 %, 1.5 % at 60 degrees),
+        and the directional albedo is within 1.7 % of 1. The derivative by sigma errs by 1-4 % rms (two bounces) and
+        1-9 % (all; worst at 60 degrees and rho = 0.9; 12-25 % at rho = 1 from 30 degrees on). Beyond 86 degrees:
+        bounded f cos, no figures. At light = view, a cone of the exact reflectance, the subgradient is 0.
+    Source: fitted here to the exact model (`examples/fast_fit`); small-sigma form from the expansion
         of the integral, d ~ 1 - sigma^2 + sigma^2 p.q, i ~ sigma^2.
     """
     ALBEDO.check("fast_rough_surface: albedo", albedo)
@@ -89,13 +90,13 @@ def fast_rough_surface(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, bounc
 def _components(cosines: Cosines, albedo: Tensor, sigma: Tensor, bounces: Bounces) -> dict[str, Tensor]:
     """Named parts (..., channel) [1/sr]; finite below the horizon."""
     rho = torch.atleast_1d(albedo)
-    # Spread over the pixels first: the derivative by a single sigma is then one sum over the image, not one a coordinate.
+    # Spread over the pixels first: the derivative by a single sigma is then one sum over the image.
     spread = sigma.expand(torch.broadcast_shapes(sigma.shape, cosines.light.shape))
     r = ring(cosines, spread)
     lead = KNEE**2 * knee(spread)
     sums = _polynomials(r, sigma, bounces)
     parts = {
-        # The bounds act within a degree of the horizon only, where the reflectance itself tends to 0 in forward directions.
+        # The bounds act within a degree of the horizon only, where forward reflectance itself tends to 0.
         "direct": rho * ((1 - lead + r.along / KAPPA**2 + sums["direct"]).clamp(min=0) / math.pi)[..., None],
         "two_bounce": rho * rho * ((lead + sums["two_bounce"]).clamp(min=0) / math.pi)[..., None],
     }
