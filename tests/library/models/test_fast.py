@@ -154,6 +154,23 @@ def test_a_field_of_sigma_is_captured_as_it_is_computed():
     assert_close(captured(sigma), value(sigma), rtol=1e-12, atol=0)
 
 
+@pytest.mark.parametrize("radians", [0.0, 0.7])
+def test_one_trained_sigma_is_captured_with_its_derivatives(radians):
+    light, view, azimuth = angles(10, 16, 80.0)
+    light.requires_grad_()
+    sigma = number(radians).requires_grad_()
+
+    def value(light, sigma):
+        return fast_rough_surface(cosines_at(light, view, azimuth), albedo=number(0.6), sigma=sigma, bounces="all")
+
+    torch.compiler.reset()
+    found = torch.compile(value, fullgraph=True, backend="eager")(light, sigma)
+    expected = value(light, sigma)
+    assert_close(found, expected, rtol=1e-12, atol=0)
+    for got, right in zip(*(torch.autograd.grad(f.sum(), (light, sigma)) for f in (found, expected)), strict=True):
+        assert_close(got, right, rtol=1e-10, atol=1e-13)
+
+
 @pytest.mark.parametrize("bounces", [2, "all"])
 @pytest.mark.parametrize("sigma", [0.0, 0.4, 1.3])
 def test_first_and_second_derivatives(bounces, sigma):

@@ -83,6 +83,15 @@ def chebyshev(x: Tensor, count: int) -> list[Tensor]:
     return rows[:count]
 
 
+def chebyshev_slope(x: Tensor, count: int) -> list[Tensor]:
+    """Derivatives of `chebyshev` by x, each (...). [-]"""
+    y, rows = 2 * x - 1, chebyshev(x, count)
+    slopes = [torch.zeros_like(y), torch.full_like(y, 2.0)]
+    while len(slopes) < count:
+        slopes.append(4 * rows[len(slopes) - 1] + 2 * y * slopes[-1] - slopes[-2])
+    return slopes[:count]
+
+
 def contract(r: Ring, terms: Sequence[Term], weights: Sequence[Tensor]) -> Tensor:
     """sum_n weights[n] * factor_n A^i S^j Q^k (...), nested (Horner) so that each coordinate is read rarely.
 
