@@ -53,7 +53,12 @@ def draw(rows: list[dict], front: set[str], machine: str, path: Path) -> None:
         on_front = row["name"] in front
         axis.loglog(row["forward"], row["rms_error"], "o", color="tab:red" if on_front else "tab:gray")
         axis.annotate(
-            row["name"], (row["forward"], row["rms_error"]), xytext=(5, 4), textcoords="offset points", fontsize=7
+            row["name"],
+            (row["forward"], row["rms_error"]),
+            xytext=(5, 3),
+            textcoords="offset points",
+            fontsize=8 if on_front else 5,
+            rotation=0 if on_front else 35,
         )
     line = sorted((row["forward"], row["rms_error"]) for row in rows if row["name"] in front)
     axis.step(*zip(*line, strict=True), where="post", color="tab:red", linewidth=0.8, label="Pareto front")

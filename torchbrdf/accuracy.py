@@ -117,7 +117,7 @@ def ladder(
     cosines: Cosines,
     *,
     rungs: Sequence[Rung] = RUNGS,
-    repeats: int = 5,
+    repeats: int = 9,
     compiled: bool = False,
 ) -> Ladder:
     """Error and cost of every rung for materials and a scene's own directions.
