@@ -12,9 +12,44 @@ Conventions, stated once:
 
 from torchbrdf.brdf import BRDF, LinearBRDF, WeightedSum
 from torchbrdf.directions import Cosines
+from torchbrdf.fresnel import (
+    Conductor,
+    Dielectric,
+    Fresnel,
+    Perfect,
+    Schlick,
+    conductor,
+    dielectric,
+    dielectric_average,
+    f0_from_index,
+    schlick,
+)
+from torchbrdf.microfacet import (
+    HalfVector,
+    smith_correlated,
+    smith_separable,
+    v_cavities,
+    v_cavity_masking,
+)
+from torchbrdf.models.ashikhmin_shirley import AshikhminShirley
+from torchbrdf.models.burley import Burley, burley
 from torchbrdf.models.lambert import Lambert
+from torchbrdf.models.layered import Coupled, Dampened, Mirror
+from torchbrdf.models.microfacet import GGX, AnisotropicBeckmann, AnisotropicGGX, Beckmann
+from torchbrdf.models.minnaert import Minnaert, minnaert
 from torchbrdf.models.oren_nayar.functional import OrenNayar, oren_nayar
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar, qualitative
+from torchbrdf.models.oriented import Oriented
+from torchbrdf.models.phong import MaxCosinePhong, ModifiedPhong, Phong, phong_radiance
+from torchbrdf.models.planetary import Hapke, LambertSphere, LommelSeeliger, lambert_sphere_fast
+from torchbrdf.models.rough_diffuse import (
+    EON,
+    FujiiOrenNayar,
+    eon_albedo_from_directional,
+    eon_albedo_from_white_sky,
+)
+from torchbrdf.models.tabulated import TabulatedBRDF, rusinkiewicz_angles
+from torchbrdf.models.torrance_sparrow import TorranceSparrow, torrance_sparrow
 from torchbrdf.parameters import (
     Constrained,
     Interval,
@@ -24,22 +59,68 @@ from torchbrdf.parameters import (
     sigma_from_mean_slope,
     trainable,
 )
+from torchbrdf.sampling import Sample
 
-__all__ = [
+__all__ = [  # noqa: RUF022 - plain alphabetical order
+    "AnisotropicBeckmann",
+    "AnisotropicGGX",
+    "AshikhminShirley",
     "BRDF",
+    "Beckmann",
+    "Burley",
+    "Conductor",
     "Constrained",
     "Cosines",
+    "Coupled",
+    "Dampened",
+    "Dielectric",
+    "EON",
+    "Fresnel",
+    "FujiiOrenNayar",
+    "GGX",
+    "HalfVector",
+    "Hapke",
     "Interval",
     "Lambert",
+    "LambertSphere",
     "LinearBRDF",
+    "LommelSeeliger",
+    "MaxCosinePhong",
+    "Minnaert",
+    "Mirror",
+    "ModifiedPhong",
     "OrenNayar",
+    "Oriented",
+    "Perfect",
+    "Phong",
     "QualitativeOrenNayar",
+    "Sample",
+    "Schlick",
+    "TabulatedBRDF",
+    "TorranceSparrow",
     "WeightedSum",
+    "burley",
+    "conductor",
+    "dielectric",
+    "dielectric_average",
+    "eon_albedo_from_directional",
+    "eon_albedo_from_white_sky",
+    "f0_from_index",
     "fixed",
+    "lambert_sphere_fast",
+    "minnaert",
     "oren_nayar",
+    "phong_radiance",
     "qualitative",
+    "rusinkiewicz_angles",
+    "schlick",
     "sigma_from_beckmann_alpha",
     "sigma_from_degrees",
     "sigma_from_mean_slope",
+    "smith_correlated",
+    "smith_separable",
+    "torrance_sparrow",
     "trainable",
+    "v_cavities",
+    "v_cavity_masking",
 ]

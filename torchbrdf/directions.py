@@ -46,44 +46,72 @@ class Cosines:
         view: normal . view (...). [-]
         phase: light . view (...). [-]
         above_horizon: where both light and view are above the horizon (...).
+        light_tangent, light_bitangent, view_tangent, view_bitangent: components of light and view along the
+            tangent and along normal x tangent (...); None when no tangent was given. 0 below the horizon.
     """
 
     light: Tensor
     view: Tensor
     phase: Tensor
     above_horizon: Tensor
+    light_tangent: Tensor | None = None
+    light_bitangent: Tensor | None = None
+    view_tangent: Tensor | None = None
+    view_bitangent: Tensor | None = None
 
     @classmethod
-    def of(cls, normal: Tensor, light: Tensor, view: Tensor, *, normalize: bool = False) -> "Cosines":
+    def of(
+        cls, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
+    ) -> "Cosines":
         """Cosines of directions (..., 3) that leave the surface; leading shapes broadcast.
 
         Args:
             normal, light, view: unit vectors (..., 3), float32 or float64, all of one dtype.
+            tangent: direction (..., 3) of any length along which an anisotropic surface is aligned; its part
+                along the normal is removed.
             normalize: scale the vectors to unit length instead of refusing others.
         Raises:
             TypeError: a dtype other than float32 and float64 (half types lose up to 20 % at grazing
                 angles), or dtypes that differ.
             ValueError: a trailing dimension other than 3, shapes that do not broadcast, entries that
-                are not finite, or vectors that are not of unit length.
+                are not finite, vectors that are not of unit length, or a tangent parallel to the normal.
         """
         vectors = {"normal": normal, "light": light, "view": view}
-        _check_shapes(vectors)
+        _check_shapes(vectors if tangent is None else vectors | {"tangent": tangent})
         if normalize:
             vectors = {name: _normalized(name, v) for name, v in vectors.items()}
         else:
             for name, v in vectors.items():
                 _check_unit(name, v)
         n, s, v = vectors.values()
-        return cls.from_products(dot(n, s), dot(n, v), dot(s, v))
+        products = (dot(n, s), dot(n, v), dot(s, v))
+        if tangent is None:
+            return cls.from_products(*products)
+        t = orthonormal_tangent(n, tangent)
+        b = cross(n, t)
+        return cls.from_products(*products, in_plane=(dot(t, s), dot(b, s), dot(t, v), dot(b, v)))
 
     @classmethod
-    def from_products(cls, light: Tensor, view: Tensor, phase: Tensor) -> "Cosines":
-        """From the three dot products themselves (...), unchecked."""
-        light, view, phase = torch.broadcast_tensors(light, view, phase)
+    def from_products(
+        cls,
+        light: Tensor,
+        view: Tensor,
+        phase: Tensor,
+        *,
+        in_plane: tuple[Tensor, Tensor, Tensor, Tensor] | None = None,
+    ) -> "Cosines":
+        """From the three dot products themselves (...), unchecked.
+
+        `in_plane`: light_tangent, light_bitangent, view_tangent, view_bitangent, where a tangent is known.
+        """
+        light, view, phase, *planar = torch.broadcast_tensors(light, view, phase, *(in_plane or ()))
         limit = horizon(light.dtype)
         above = (light > limit) & (view > limit)
         below = ~above
-        return cls(light.masked_fill(below, 1.0), view.masked_fill(below, 1.0), phase.masked_fill(below, 1.0), above)
+        light, view, phase = (x.masked_fill(below, 1.0) for x in (light, view, phase))
+        if not planar:
+            return cls(light, view, phase, above)
+        return cls(light, view, phase, above, *(x.masked_fill(below, 0.0) for x in planar))
 
     def zero_below_horizon(self, brdf: Tensor) -> Tensor:
         """brdf (..., channel) where light and view are above the horizon, else 0 with zero gradient."""
@@ -136,6 +164,41 @@ class Cosines:
         return angle_over_sine(self.beta)
 
 
+def cross(a: Tensor, b: Tensor) -> Tensor:
+    """Vector product of (..., 3), broadcasting."""
+    ax, ay, az = a.unbind(-1)
+    bx, by, bz = b.unbind(-1)
+    return torch.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), -1)
+
+
+def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
+    """Unit vector (..., 3) along the part of `tangent` that is perpendicular to the unit normal.
+
+    Raises: ValueError where the tangent is (within rounding) parallel to the normal, 0 or not finite.
+    """
+    t = _normalized("tangent", tangent)
+    across = t - dot(t, normal)[..., None] * normal
+    squared = dot(across, across)
+    usable = squared > unit_tolerance(t.dtype) ** 2
+    if not holds(usable):
+        raise ValueError(
+            f"tangent must not be parallel to the normal; {int((~usable).sum())} of {usable.numel()} are. "
+            "Pass a direction that lies in the surface."
+        )
+    return across / squared.masked_fill(~usable, 1.0).sqrt()[..., None]
+
+
+def any_tangent(normal: Tensor) -> Tensor:
+    """A unit vector (..., 3) perpendicular to the unit normal, smooth except where normal_z changes sign.
+
+    Source: Duff et al. 2017, Building an Orthonormal Basis, Revisited.
+    """
+    x, y, z = normal.unbind(-1)
+    sign = torch.where(z < 0, -torch.ones_like(z), torch.ones_like(z))
+    a = -1 / (sign + z)
+    return torch.stack((1 + sign * x * x * a, sign * x * y * a, -sign * x), -1)
+
+
 def _check_shapes(vectors: dict[str, Tensor]) -> None:
     for name, v in vectors.items():
         if not isinstance(v, Tensor):
@@ -146,13 +209,18 @@ def _check_shapes(vectors: dict[str, Tensor]) -> None:
             raise ValueError(f"{name} must have shape (..., 3); found {tuple(v.shape)}.")
     if len({v.dtype for v in vectors.values()}) > 1:
         found = ", ".join(f"{name} {v.dtype}" for name, v in vectors.items())
-        raise TypeError(f"normal, light and view must share one dtype; found {found}.")
+        raise TypeError(f"{_list(vectors)} must share one dtype; found {found}.")
     shapes = [v.shape for v in vectors.values()]
     try:
         torch.broadcast_shapes(*shapes)
     except RuntimeError:
         found = ", ".join(f"{name} {tuple(v.shape)}" for name, v in vectors.items())
-        raise ValueError(f"normal, light and view must broadcast; found {found}.") from None
+        raise ValueError(f"{_list(vectors)} must broadcast; found {found}.") from None
+
+
+def _list(vectors: dict[str, Tensor]) -> str:
+    *names, last = vectors
+    return f"{', '.join(names)} and {last}"
 
 
 def _check_unit(name: str, v: Tensor) -> None:

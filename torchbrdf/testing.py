@@ -120,7 +120,7 @@ def magnitude(brdf: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> Tensor
 
     It is f_r itself where nothing cancels.
     """
-    return _magnitude(brdf, Cosines.of(normal, light, view)).detach()
+    return _magnitude(brdf, brdf.cosines(normal, light, view)).detach()
 
 
 def assert_reciprocal(brdf: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> None:
