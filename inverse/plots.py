@@ -79,7 +79,10 @@ def residual_figure(
         picture = axis.imshow(shown.numpy(), cmap="RdBu_r", vmin=-limit, vmax=limit)
         rms = residual[valid].square().mean().sqrt().item()
         axis.set_title(f"minus {label}, rms {rms:.4f}", fontsize=10)
-        means = [residual[valid & (angles >= low) & (angles < high)].mean().item() for low, high in pairwise(edges)]
+        means = [
+            residual[valid & (angles >= low) & (angles < high)].mean().item()
+            for low, high in pairwise(edges)
+        ]
         axes[-1].plot((edges[:-1] + edges[1:]) / 2, means, ".-", color=colour, label=label)
     figure.colorbar(picture, ax=axes[len(renderings)], shrink=0.8)
     for axis in axes[:-1]:
