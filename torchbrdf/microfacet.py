@@ -17,7 +17,7 @@ from torchbrdf.directions import Cosines
 
 # exp(-x^2/2) beyond is below 1e-17 of what lies before.
 _GAUSSIAN_END = 9.0
-_NORM_NODES = 48
+_NODES, _WEIGHTS = (a.tolist() for a in leggauss(48))
 _NEWTON_STEPS = 6
 _BISECTIONS = 54
 # erfcx and the first exponential agree to rounding long before; exp(-a^2) underflows anyway.
@@ -101,12 +101,12 @@ def slope_area_norm(sigma: Tensor) -> Tensor:
 
 def _slope_area_integral(sigma: Tensor, end: Tensor) -> Tensor:
     """2 pi/sigma^2 times the integral of exp(-theta^2/2 sigma^2) sin(theta) from 0 to end [rad] (...)."""
-    nodes, weights = (torch.from_numpy(a).to(sigma) for a in leggauss(_NORM_NODES))
+    nodes, weights = sigma.new_tensor(_NODES), sigma.new_tensor(_WEIGHTS)
     s = sigma[..., None]
     last = (end[..., None] / s).clamp(max=_GAUSSIAN_END)
     x = last * (1 + nodes) / 2
     integrand = (-0.5 * x * x).exp() * x * torch.sinc(s * x / math.pi)
-    return 2 * math.pi * (integrand * last * weights / 2).sum(-1)
+    return (math.pi * weights * last * integrand).sum(-1)
 
 
 def slope_area_angle(u: Tensor, sigma: Tensor) -> Tensor:
@@ -170,7 +170,7 @@ def anisotropic_ggx_distribution(half: HalfVector, *, alpha_x: Tensor, alpha_y: 
 
 def _ggx(half: HalfVector, stretched: Tensor, area: Tensor) -> Tensor:
     q = stretched + half.cos * half.cos
-    return 1 / (math.pi * area * q * q)
+    return 1 / (math.pi * (area * q * q))  # a number times a 0-d tensor has float64 tangents in torch 2.13
 
 
 def beckmann_distribution(half: HalfVector, *, alpha: Tensor) -> Tensor:
@@ -189,7 +189,7 @@ def anisotropic_beckmann_distribution(half: HalfVector, *, alpha_x: Tensor, alph
 def _beckmann(half: HalfVector, stretched: Tensor, area: Tensor) -> Tensor:
     cos_squared = half.cos * half.cos
     # in one exponent: cos^-4 overflows where the exponential has long vanished
-    return (-stretched / cos_squared - 2 * cos_squared.log()).exp() / (math.pi * area)
+    return (-stretched / cos_squared - 2 * cos_squared.log()).exp() / area / math.pi
 
 
 def ggx_lambda(slope_squared: Tensor) -> Tensor:

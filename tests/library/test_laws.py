@@ -6,7 +6,7 @@ import math
 
 import pytest
 import torch
-from catalog import MODELS, mixture
+from catalog import MODELS, OTHERS, every_other, mixture
 from torch.func import functional_call, vmap
 
 from torchbrdf import BRDF, OrenNayar, QualitativeOrenNayar, fixed
@@ -15,7 +15,8 @@ from torchbrdf import testing as laws
 TOLERANCE = laws.TOLERANCE
 HARD = list(laws.hard_directions())
 EXCEPTIONS = [m for m in MODELS if m.reason]
-TRAINED = [m for m in MODELS if any(True for _ in m.make(torch.float32).parameters())]
+# A mirror has parameters that no value of f_r shows.
+TRAINED = [m for m in MODELS if m.name != "mirror" and any(True for _ in m.make(torch.float32).parameters())]
 
 
 def few(n, dtype=torch.float64):
@@ -27,7 +28,8 @@ def assert_same(got, expected, dtype):
 
 
 def test_reciprocal(model, dtype, directions):
-    laws.assert_reciprocal(model.make(dtype), *directions)
+    if model.reciprocal:
+        laws.assert_reciprocal(model.make(dtype), *directions)
 
 
 def test_not_below_what_the_catalog_says(model, dtype, directions):
@@ -42,7 +44,7 @@ def test_zero_below_horizon(model, dtype, directions):
 
 
 def test_energy(model):
-    laws.assert_energy(model.make(torch.float64), limit=model.energy_limit)
+    laws.assert_energy(model.make(torch.float64), limit=model.energy_limit, nodes=model.nodes)
 
 
 @pytest.mark.parametrize("model", EXCEPTIONS, ids=lambda m: m.name)
@@ -53,7 +55,10 @@ def test_exceptions_are_still_needed(model):
             laws.assert_nonnegative(brdf, *laws.hard_directions(torch.float64)["mirror at 89.9 deg"])
     if model.energy_limit > 1:
         with pytest.raises(AssertionError, match="limit 1"):
-            laws.assert_energy(brdf)
+            laws.assert_energy(brdf, nodes=model.nodes)
+    if not model.reciprocal:
+        with pytest.raises(AssertionError, match="not reciprocal"):
+            laws.assert_reciprocal(brdf, *few(100))
 
 
 @pytest.mark.parametrize("where", HARD)
@@ -107,7 +112,7 @@ def test_float32_matches_float64(model):
     # lost a digit before the model sees it.
     generator = torch.Generator().manual_seed(2)
     laws.assert_float32_matches_float64(
-        model.make(torch.float32), *laws.random_directions(20_000, generator=generator), rtol=1e-6
+        model.make(torch.float32), *laws.random_directions(20_000, generator=generator), rtol=model.float32_error
     )
 
 
@@ -181,11 +186,14 @@ def test_functional_call_reads_the_given_parameters(model):
 @pytest.mark.parametrize("backend", ["eager", "aot_eager"])
 def test_captured_in_one_graph(model, backend):
     # The graph and its derivative, without code generation: what can break model by model.
+    if backend == "aot_eager" and model in OTHERS:
+        pytest.skip("test_compiles has it, in one graph with others")
     assert_compiles(model.make(torch.float32), few(16, torch.float32), backend)
 
 
-def test_compiles(dtype):
-    assert_compiles(mixture(dtype), few(16, dtype), "inductor")  # every model at once: one is 15 s
+@pytest.mark.parametrize("build", [mixture, every_other])
+def test_compiles(dtype, build):
+    assert_compiles(build(dtype), few(16, dtype), "inductor")  # many models at once: one is 15 s
 
 
 def assert_compiles(brdf: BRDF, directions: laws.Directions, backend: str) -> None:
@@ -294,9 +302,15 @@ def test_directional_albedo_agrees_with_another_quadrature(model):
     brdf = model.make(torch.float64)
     for angle in (0.0, 0.5, 1.2, math.radians(85)):
         cosine = torch.tensor(math.cos(angle), dtype=torch.float64)
-        expected = laws._directional_albedo(brdf, angle, 32)
-        torch.testing.assert_close(brdf.directional_albedo(cosine, nodes=128), expected, rtol=0, atol=5e-5)
-        torch.testing.assert_close(brdf.directional_albedo(cosine), expected, rtol=0, atol=3e-4)
+        expected = laws._directional_albedo(brdf, angle, max(32, model.nodes))
+        upright = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64)
+        view = torch.tensor([math.sin(angle), 0.0, math.cos(angle)], dtype=torch.float64)
+        mirror = brdf.delta_reflectance(brdf.cosines(upright, upright, view, normalize=True))
+        expected = expected if mirror is None else expected + mirror
+        error = model.albedo_error
+        got = brdf.directional_albedo(cosine, nodes=128)
+        torch.testing.assert_close(got, expected.expand_as(got), rtol=0, atol=max(5e-5, error / 5))
+        torch.testing.assert_close(brdf.directional_albedo(cosine), expected.expand_as(got), rtol=0, atol=error)
 
 
 def test_directional_albedo_of_lambert_is_its_albedo():

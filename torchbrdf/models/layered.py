@@ -97,7 +97,7 @@ class Coupled(_Polished):
     def __init__(self, *, albedo: Tensor | float | fixed = 0.5, fresnel: Fresnel | None = None):
         super().__init__()
         self.albedo = albedo
-        self.fresnel = Schlick() if fresnel is None else fresnel
+        self.fresnel = Schlick(f0=self.albedo.new_tensor(0.04)) if fresnel is None else fresnel
 
     def body_albedo(self) -> Tensor:
         return self.albedo
@@ -133,7 +133,7 @@ class Dampened(_Polished):
     def __init__(self, *, albedo: Tensor | float | fixed = 0.5, fresnel: Fresnel | None = None):
         super().__init__()
         self.albedo = albedo
-        self.fresnel = Schlick() if fresnel is None else fresnel
+        self.fresnel = Schlick(f0=self.albedo.new_tensor(0.04)) if fresnel is None else fresnel
 
     def body_albedo(self) -> Tensor:
         return self.albedo

@@ -76,15 +76,12 @@ class _Isotropic(_Microfacet):
     ):
         super().__init__()
         self.alpha = alpha
-        self.fresnel = Schlick() if fresnel is None else fresnel
+        self.fresnel = Schlick(f0=self.alpha.new_tensor(0.04)) if fresnel is None else fresnel
         self.masking = masking
 
     def slopes_squared(self, cosines: Cosines) -> tuple[Tensor, Tensor]:
-        a2 = self._width() ** 2
+        a2 = self.alpha * self.alpha
         return a2 * tangent_squared(cosines.light), a2 * tangent_squared(cosines.view)
-
-    def _width(self) -> Tensor:
-        return torch.atleast_1d(self.alpha)
 
     def _widths(self) -> tuple[Tensor, Tensor]:
         return self.alpha, self.alpha
@@ -106,7 +103,7 @@ class _Anisotropic(_Microfacet):
         super().__init__()
         self.alpha_x = alpha_x
         self.alpha_y = alpha_y
-        self.fresnel = Schlick() if fresnel is None else fresnel
+        self.fresnel = Schlick(f0=self.alpha_x.new_tensor(0.04)) if fresnel is None else fresnel
         self.masking = masking
 
     def slopes_squared(self, cosines: Cosines) -> tuple[Tensor, Tensor]:
@@ -141,7 +138,7 @@ class GGX(_Isotropic):
     """
 
     def distribution(self, half: HalfVector) -> Tensor:
-        return ggx_distribution(half, alpha=self._width())
+        return ggx_distribution(half, alpha=self.alpha)
 
     def smith_lambda(self, slope_squared: Tensor) -> Tensor:
         return ggx_lambda(slope_squared)
@@ -186,7 +183,7 @@ class Beckmann(_Isotropic):
     """
 
     def distribution(self, half: HalfVector) -> Tensor:
-        return beckmann_distribution(half, alpha=self._width())
+        return beckmann_distribution(half, alpha=self.alpha)
 
     def smith_lambda(self, slope_squared: Tensor) -> Tensor:
         return beckmann_lambda(slope_squared)

@@ -118,7 +118,7 @@ class FujiiOrenNayar(_RoughDiffuse):
 
     def directional_albedo(self, cos_view: Tensor, *, nodes: int = 32) -> Tensor:
         """rho (1 + r G/pi)/(1 + c1 r), in closed form; `nodes` is not used."""
-        return torch.atleast_1d(self.albedo) * fon_albedo(cos_view, roughness=self.roughness)[..., None]
+        return torch.atleast_1d(self.albedo) * fon_albedo(cos_view[..., None], roughness=self.roughness[..., None])
 
 
 @final
@@ -166,14 +166,14 @@ class EON(_RoughDiffuse):
 
     def directional_albedo(self, cos_view: Tensor, *, nodes: int = 32) -> Tensor:
         """rho E + rho_ms (1 - E), in closed form; `nodes` is not used."""
-        white = fon_albedo(cos_view, roughness=self.roughness, exact=self.exact)[..., None]
+        white = fon_albedo(cos_view[..., None], roughness=self.roughness[..., None], exact=self.exact)
         return torch.atleast_1d(self.albedo) * white + self._returned() * (1 - white)
 
     def average_albedo(self) -> Tensor:
         """Share of uniform light that is reflected (..., channel). [-]"""
-        rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness)[..., None]
+        rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness[..., None])
         return rho * average / (1 - rho * (1 - average))
 
     def _returned(self) -> Tensor:
-        rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness)[..., None]
+        rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness[..., None])
         return rho * rho * average / (1 - rho * (1 - average))

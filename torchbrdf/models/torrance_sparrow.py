@@ -52,7 +52,7 @@ def torrance_sparrow(
 def _lobe(cosines: Cosines, half: HalfVector, sigma: Tensor, normalised: bool) -> Tensor:
     spread = slope_area(half, sigma=sigma) / 4
     if not normalised:
-        spread = spread * (4 * slope_area_norm(sigma))
+        spread = 4 * (spread * slope_area_norm(sigma))
     return v_cavity_masking(cosines, half) * spread / (cosines.light * cosines.view * half.cos)
 
 
@@ -80,7 +80,7 @@ class TorranceSparrow(BRDF):
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         half = HalfVector.of(cosines)
-        lobe = _lobe(cosines, half, torch.atleast_1d(self.sigma), self.normalised)
+        lobe = _lobe(cosines, half, self.sigma, self.normalised)
         return {"specular": lobe[..., None] * self.fresnel(half.cos_light)}
 
     def propose(self, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:
