@@ -187,13 +187,16 @@ def test_functional_call_reads_the_given_parameters(model):
 def test_captured_in_one_graph(model, backend):
     # The graph and its derivative, without code generation: what can break model by model.
     if backend == "aot_eager" and model in OTHERS:
-        pytest.skip("test_compiles has it, in one graph with others")
+        pytest.skip("test_others_compile differentiates one of each kind")
     assert_compiles(model.make(torch.float32), few(16, torch.float32), backend)
 
 
-@pytest.mark.parametrize("build", [mixture, every_other])
-def test_compiles(dtype, build):
-    assert_compiles(build(dtype), few(16, dtype), "inductor")  # many models at once: one is 15 s
+def test_compiles(dtype):
+    assert_compiles(mixture(dtype), few(16, dtype), "inductor")  # many models at once: one is 15 s
+
+
+def test_others_compile():
+    assert_compiles(every_other(torch.float32), few(16, torch.float32), "inductor")  # 20 s, too many for both dtypes
 
 
 def assert_compiles(brdf: BRDF, directions: laws.Directions, backend: str) -> None:

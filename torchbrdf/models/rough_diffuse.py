@@ -10,7 +10,7 @@ from torchbrdf._numerics import angle_over_sine, safe_sqrt
 from torchbrdf.brdf import LinearBRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
-from torchbrdf.sampling import cltc_density, cltc_sample
+from torchbrdf.sampling import CltcSampled
 
 # 1/2 - 2/(3 pi) and 2/3 - 28/(15 pi): the mean of the retro term at grazing, and over the hemisphere.
 C1 = 0.5 - 2 / (3 * math.pi)
@@ -70,16 +70,12 @@ def eon_albedo_from_directional(target: Tensor, cos: Tensor, *, roughness: Tenso
     return 2 * target / (b + safe_sqrt(b * b + 4 * target * (average - directional)))
 
 
-class _RoughDiffuse(LinearBRDF):
+class _RoughDiffuse(CltcSampled, LinearBRDF):
     albedo: Constrained = Constrained(ALBEDO)
     roughness: Constrained = Constrained(FON_ROUGHNESS)
 
-    def propose(self, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:
-        light = cltc_sample(view, self.roughness, u)
-        return light, torch.zeros_like(light[..., 0], dtype=torch.bool)
-
-    def density(self, cosines: Cosines) -> Tensor:
-        return cltc_density(cosines, self.roughness)
+    def sampling_roughness(self) -> Tensor:
+        return self.roughness
 
     def _direct(self) -> tuple[Tensor, Tensor, Tensor]:
         """Coefficients of 1 and of the retro term, and r, all with a trailing channel."""
