@@ -26,10 +26,11 @@ def burley(cosines: Cosines, *, albedo: Tensor, roughness: Tensor, renormalised:
         cosines: of light, view and phase angle, each (...).
         albedo: rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
         roughness: R, scalar or (...). [-] in [0, 1]
-        renormalised: Frostbite's form, which conserves energy.
+        renormalised: Frostbite's form, which conserves energy but for the last two degrees before grazing.
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo or roughness leave their domains.
-    Deviations: as published does not conserve energy (directional albedo 1.46 at cosine 0.05, R = 1).
+    Deviations: as published does not conserve energy (directional albedo 1.46 at cosine 0.05, R = 1). Renormalised
+        it stays below 0.97 down to cosine 0.05 and reaches 1.03 at grazing.
     Source: Burley 2012; Lagarde & de Rousiers 2014.
     """
     ALBEDO.check("burley: albedo", albedo)
@@ -52,7 +53,7 @@ class Burley(BRDF):
     Args:
         albedo: rho, scalar, (channel,) or (..., channel). [-]
         roughness: R, scalar or (...). [-]
-        renormalised: Frostbite's form, which conserves energy.
+        renormalised: Frostbite's form, which conserves energy but for the last two degrees before grazing.
     Components: direct.
     """
 
