@@ -16,7 +16,7 @@ lint: .venv/ready
 	$(BIN)/pyright
 
 bench: .venv/ready
-	$(BIN)/python examples/bench_models.py
+	$(BIN)/python examples/03_accuracy_vs_time.py --output output
 
 clean:
 	rm -rf .venv build output *.egg-info .pytest_cache .ruff_cache

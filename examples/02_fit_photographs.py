@@ -53,10 +53,10 @@ def main() -> None:
     sigma = fitted["QualitativeOrenNayar"]
     print(f"QualitativeOrenNayar: sigma {sigma.estimate('sigma')} counts the noise of the pixels alone;")
     print(f"refits to {args.refits} bootstrap samples of the images: +- {torch.rad2deg(spread['sigma']):.1f} deg.")
-    print("The second is the honest one: errors of the lights are shared by all pixels of an image.")
+    print("Errors of lights and shape are shared by all pixels of an image: only the second number sees them.")
     rms = {name: found.residual_rms for name, found in fitted.items()}
     gain = 1 - (rms["QualitativeOrenNayar"] / rms["Lambert"]) ** 2
-    print(f"Oren-Nayar explains {gain:.1%} of the variance that Lambert leaves.")
+    print(f"Oren-Nayar explains {gain:.1%} of the variance that Lambert leaves; the figure shows where it does not.")
     shown = {name: render(scene, found.model).detach() * torch.pi for name, found in fitted.items()}
     path = args.output / "photographs_fit.png"
     residual_figure(path, scene, photographs, shown, valid)

@@ -14,6 +14,7 @@ from inverse.result import FitResult
 from inverse.scene import Scene
 from inverse.sensor import Sensor
 from inverse.shading import render
+from inverse.solids import cuboid, side_by_side
 
 __all__ = [
     "Ambient",
@@ -27,6 +28,7 @@ __all__ = [
     "belly_row",
     "bootstrap",
     "cross_section",
+    "cuboid",
     "cylinder",
     "fit",
     "from_depth",
@@ -37,6 +39,7 @@ __all__ = [
     "read_stack",
     "render",
     "revolution",
+    "side_by_side",
     "sphere",
     "usable",
     "vase",

@@ -7,7 +7,6 @@ import time
 import torch
 from torch import Tensor
 
-from inverse.geometry import pixel_average
 from inverse.identifiability import Covariance, judge
 from inverse.levenberg import Solution, minimise
 from inverse.prediction import predictor
@@ -52,8 +51,8 @@ def fit(
     Args:
         scene: geometry, lights, exposure and point-spread function, all taken as known.
         photographs: sensor values (image, rows, columns, channel), linear, full scale 1.
-        model: start values; it is copied, not changed. A parameter with one entry for each masked
-            point of the surface (first dimension) is fitted pixel by pixel.
+        model: start values; it is copied, not changed. Per-texel parameters have one entry for each
+            masked point of the surface, in row-major order, and are fitted pixel by pixel.
         valid: samples that may be used, bool (image, rows, columns).
         free_exposure: fit the exposure of every image after the first, relative to it.
         free_ambient: fit a constant added to each image: stray and ambient light, black level.
@@ -67,12 +66,17 @@ def fit(
     """
     began = time.perf_counter()
     dtype = scene.surface.normals.dtype
-    photographs = checked(scene, photographs).to(dtype)
+    if not isinstance(model, BRDF):
+        raise TypeError(f"model must be a BRDF; found {model!r}.")
+    for name, count in (("starts", starts), ("max_steps", max_steps)):
+        if not isinstance(count, int) or count < 1:
+            raise ValueError(f"{name} must be a whole number of at least 1; found {count}.")
+    photographs = checked(scene, photographs).detach().to(dtype)
     valid = usable_samples(scene, photographs, valid)
     model = copy.deepcopy(model).to(dtype)
     pixels = valid.any(0)
     measured, used = photographs[:, pixels], valid[:, pixels, None].to(dtype)
-    texels = pixels[_object(scene)].nonzero()[:, 0]
+    texels = pixels[scene.surface.coverage() == 1].nonzero()[:, 0]
     unknowns = Unknowns(
         model, texels, int(scene.surface.mask.sum()), scene.images,
         free_exposure=free_exposure, free_ambient=free_ambient,
@@ -84,6 +88,12 @@ def fit(
         return (predict(raw) * exposure[:, None, None] + ambient[:, None, None] - measured) * used
 
     shared, own = unknowns.pack()
+    channels = predict(unknowns.unpack(shared, own)[0]).shape[-1]
+    if channels not in (1, photographs.shape[-1]):
+        raise ValueError(
+            f"the photographs have {photographs.shape[-1]} channels, and model and lights {channels}. "
+            "A per-texel albedo has shape (points, channel)."
+        )
     solutions = [
         minimise(residual, start, own, max_steps=max_steps) for start in _starts(unknowns, shared, starts, seed)
     ]
@@ -96,9 +106,12 @@ def fit(
 
 
 def checked(scene: Scene, photographs: Tensor) -> Tensor:
-    """The photographs, if they can be of this scene; ValueError otherwise."""
+    """The photographs, if they can be of this scene; TypeError or ValueError otherwise."""
+    if not isinstance(photographs, Tensor) or not photographs.is_floating_point():
+        found = photographs.dtype if isinstance(photographs, Tensor) else type(photographs).__name__
+        raise TypeError(f"photographs must be a floating-point torch.Tensor with full scale 1; found {found}.")
     rows, columns = scene.surface.resolution
-    if photographs.ndim != 4 or photographs.shape[:3] != (scene.images, rows, columns):
+    if photographs.ndim != 4 or photographs.shape[:3] != (scene.images, rows, columns) or not photographs.shape[3]:
         raise ValueError(
             f"photographs must have shape (image, rows, columns, channel) = ({scene.images}, {rows}, {columns}, "
             f"channel), one image for each of the scene's {scene.images} sets of lights; "
@@ -113,8 +126,10 @@ def checked(scene: Scene, photographs: Tensor) -> Tensor:
 
 def usable_samples(scene: Scene, photographs: Tensor, valid: Tensor | None) -> Tensor:
     """Samples the fit uses (image, rows, columns): covered, allowed by `valid`, not saturated."""
-    allowed = _object(scene).expand(photographs.shape[:3])
+    allowed = (scene.surface.coverage() == 1).expand(photographs.shape[:3])
     if valid is not None:
+        if not isinstance(valid, Tensor):
+            raise TypeError(f"valid must be a torch.Tensor; found {type(valid).__name__}.")
         if valid.shape != photographs.shape[:3] or valid.dtype != torch.bool:
             raise ValueError(
                 f"valid must be bool of shape {tuple(photographs.shape[:3])}; found {valid.dtype} {tuple(valid.shape)}."
@@ -136,24 +151,13 @@ def usable_samples(scene: Scene, photographs: Tensor, valid: Tensor | None) -> T
     return allowed & unsaturated
 
 
-def _object(scene: Scene) -> Tensor:
-    """Pixels that the object covers fully (rows, columns)."""
-    surface = scene.surface
-    if surface.samples == 1:
-        return surface.mask
-    share = pixel_average(surface.mask[..., None].double(), surface.samples)[..., 0]
-    return share == 1
-
-
-def _starts(unknowns: Unknowns, own_start: Tensor, count: int, seed: int) -> list[Tensor]:
+def _starts(unknowns: Unknowns, first: Tensor, count: int, seed: int) -> list[Tensor]:
     """The model's own start and count - 1 random ones, spread over the finite domains."""
-    if count < 1:
-        raise ValueError(f"starts must be at least 1; found {count}.")
     generator = torch.Generator().manual_seed(seed)
-    found = [own_start]
+    found = [first]
     for _ in range(count - 1):
         pieces = []
-        for entry, raw in unknowns.split_shared(own_start):
+        for entry, raw in unknowns.split_shared(first):
             finite = entry.domain is not None and math.isfinite(entry.domain.high)
             drawn = 0.05 + 0.9 * torch.rand(raw.shape, generator=generator, dtype=raw.dtype)
             pieces.append(torch.logit(drawn) if finite else raw)
@@ -170,11 +174,12 @@ def _result(unknowns: Unknowns, best: Solution, model: BRDF, samples: int, secon
     own_error = covariance.own.sqrt() * noise
 
     parameters, errors = {}, {}
-    shared_pieces = zip(unknowns.split_shared(best.shared), unknowns.split_shared(shared_error * noise), strict=True)
-    for (entry, raw), (_, error) in shared_pieces:
-        shape = entry.start.shape
-        parameters[entry.name] = entry.physical(raw).reshape(shape)
-        errors[entry.name] = entry.physical_error(raw, error).reshape(shape)
+    position = 0
+    for entry, raw in unknowns.split_shared(best.shared):
+        block = slice(position, position := position + len(raw))
+        value, error = entry.physical(raw), entry.shared_error(raw, covariance.shared[block, block] * noise**2)
+        shape = entry.start.shape if value.numel() == entry.start.numel() else value.shape
+        parameters[entry.name], errors[entry.name] = value.reshape(shape), error.reshape(shape)
     for (entry, raw), (_, error) in zip(unknowns.split_own(best.own), unknowns.split_own(own_error), strict=True):
         shape = (-1, *entry.start.shape[1:])
         unused = torch.full_like(entry.start, torch.nan)  # texels outside the used pixels

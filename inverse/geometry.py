@@ -43,6 +43,8 @@ class Surface:
 
     def __post_init__(self):
         shape = self.mask.shape
+        if self.mask.dtype != torch.bool or not isinstance(self.samples, int):
+            raise TypeError(f"mask must be bool and samples a whole number; found {self.mask.dtype}, {self.samples!r}.")
         if self.normals.shape != (*shape, 3) or self.points.shape != (*shape, 3):
             raise ValueError(
                 f"points and normals must be mask's shape {tuple(shape)} with a trailing 3; "
@@ -74,8 +76,10 @@ def pixel_average(image: Tensor, samples: int) -> Tensor:
 
 def pixel_grid(height: int, width: int, *, samples: int = 1, dtype: torch.dtype = torch.float32):
     """x and y (s H, s W) of the sample points of an image of `height` rows."""
-    if height < 1 or width < 1 or samples < 1:
-        raise ValueError(f"height, width and samples must be at least 1; found {height}, {width}, {samples}.")
+    if not all(isinstance(k, int) and k >= 1 for k in (height, width, samples)):
+        raise ValueError(
+            f"height, width and samples must be whole numbers of at least 1; found {height}, {width}, {samples}."
+        )
     pitch = 2 / (height * samples)
     y = 1 - pitch * (torch.arange(height * samples, dtype=dtype) + 0.5)
     x = pitch * (torch.arange(width * samples, dtype=dtype) + 0.5) - width / height
@@ -120,6 +124,8 @@ def sphere(
     samples: int = 1, dtype: torch.dtype = torch.float32,
 ) -> Surface:  # fmt: skip
     """Sphere of a radius and centre (x, y) in half image heights."""
+    if not radius > 0:
+        raise ValueError(f"sphere.radius must be positive; found {radius}.")
     x, y = pixel_grid(height, width, samples=samples, dtype=dtype)
     x, y = x - centre[0], y - centre[1]
     squared = radius * radius - x * x - y * y
@@ -133,6 +139,8 @@ def cylinder(
     samples: int = 1, dtype: torch.dtype = torch.float32,
 ) -> Surface:  # fmt: skip
     """Upright cylinder seen from the side."""
+    if not (radius > 0 and half_height > 0):
+        raise ValueError(f"cylinder.radius and half_height must be positive; found {radius} and {half_height}.")
     x, y = pixel_grid(height, width, samples=samples, dtype=dtype)
     squared = radius * radius - x * x
     z = squared.clamp(min=0).sqrt()
@@ -159,8 +167,12 @@ def from_normals(normals: Tensor, mask: Tensor | None = None) -> Surface:
     Without a mask, the object is where the vectors are finite and longer than 0.5. Positions are
     unknown, so z is 0: distant lights only.
     """
-    if normals.ndim != 3 or normals.shape[-1] != 3:
-        raise ValueError(f"normals must have shape (rows, columns, 3); found {tuple(normals.shape)}.")
+    if normals.ndim != 3 or normals.shape[-1] != 3 or not normals.is_floating_point():
+        raise ValueError(
+            f"normals must be floating-point of shape (rows, columns, 3); found {normals.dtype} {tuple(normals.shape)}."
+        )
+    if mask is not None and mask.shape != normals.shape[:2]:
+        raise ValueError(f"mask must have the normals' shape {tuple(normals.shape[:2])}; found {tuple(mask.shape)}.")
     length = normals.norm(dim=-1)
     object_ = length > 0.5 if mask is None else mask.bool()
     usable = length.isfinite() & (length > 0)

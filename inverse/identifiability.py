@@ -1,14 +1,19 @@
 """What the photographs say about the parameters: covariance, and when they say too little."""
 
+import math
+
 import torch
 from torch import Tensor
 
-from inverse.levenberg import NormalEquations, Solution
+from inverse.levenberg import NormalEquations, Solution, scale
 from inverse.unknowns import Unknown, Unknowns
+from torchbrdf import Interval
 
 # A standard error above this share of the parameter's domain tells next to nothing.
 _UNINFORMATIVE = 0.25
 _ONE_SIDED_95 = 1.645
+# A logistic coordinate whose slope has fallen to this share of the domain sits on the bound.
+_FLAT = 1e-5
 # Weight in a singular direction from which a parameter is named as part of it.
 _INVOLVED = 0.3
 
@@ -21,36 +26,48 @@ class Covariance:
     """
 
     def __init__(self, equations: NormalEquations, dtype: torch.dtype):
-        e = equations.eliminate(0.0)
-        values, vectors = torch.linalg.eigh(e.schur)
-        # Rounding of the derivatives leaves a singular direction at eps, not at 0. A scaled matrix has
-        # trace G, so eigenvalues compare with 1.
-        seen = values > 16 * torch.finfo(dtype).eps
-        inverse = (vectors[:, seen] / values[seen]) @ vectors[:, seen].T
-        unseen = vectors[:, ~seen]
-        # an unknown with any part in a blind direction has infinite variance
-        lost = unseen.abs().amax(1) > _INVOLVED if unseen.shape[1] else torch.zeros(len(values), dtype=torch.bool)
-        self.blind = unseen.T
-        self.shared = inverse / (e.shared_scale[:, None] * e.shared_scale)
+        # Rounding of the derivatives leaves a singular direction at eps, not at 0; scaled to a unit
+        # diagonal, eigenvalues compare with 1.
+        tolerance = 16 * torch.finfo(dtype).eps
+        own_scale, shared_scale = scale(equations.own), scale(equations.shared)
+        own, own_lost = _pseudo_inverse(equations.own / (own_scale[:, :, None] * own_scale[:, None, :]), tolerance)
+        mixed = equations.mixed / (shared_scale[None, :, None] * own_scale[:, None, :])
+        through = own @ mixed.mT
+        schur = equations.shared / (shared_scale[:, None] * shared_scale) - torch.einsum("ngl,nlh->gh", mixed, through)
+        shared, lost = _pseudo_inverse(schur, tolerance)
+        values, vectors = torch.linalg.eigh(schur)
+        self.blind = vectors[:, values <= tolerance].T
+        variances = own.diagonal(dim1=-2, dim2=-1) + torch.einsum("nlg,gh,nlh->nl", through, shared, through)
+        self.own = (variances / own_scale**2).masked_fill(own_lost, torch.inf)
+        self.shared = shared / (shared_scale[:, None] * shared_scale)
         self.shared[lost, :] = torch.nan
         self.shared[:, lost] = torch.nan
         self.shared[lost, lost] = torch.inf
-        unmoved = equations.own.diagonal(dim1=-2, dim2=-1) == 0
-        own = torch.linalg.inv(e.own).diagonal(dim1=-2, dim2=-1) if e.own.numel() else e.own_scale
-        own = own + torch.einsum("nlg,gh,nlh->nl", e.through, inverse, e.through)
-        self.own = torch.where(unmoved, torch.inf, own / e.own_scale**2)
+
+
+def _pseudo_inverse(matrix: Tensor, tolerance: float) -> tuple[Tensor, Tensor]:
+    """Inverse (..., n, n) outside the null space, and which unknowns (..., n) have a part in that."""
+    if not matrix.numel():
+        return matrix, matrix.new_zeros(matrix.shape[:-1], dtype=torch.bool)
+    values, vectors = torch.linalg.eigh(matrix)
+    seen = values > tolerance
+    inverse = (vectors * seen[..., None, :] / values.masked_fill(~seen, 1.0)[..., None, :]) @ vectors.mT
+    lost = ((vectors.abs() > _INVOLVED) & ~seen[..., None, :]).any(-1)
+    return inverse, lost
 
 
 def judge(unknowns: Unknowns, solution: Solution, covariance: Covariance, noise: float) -> tuple[str, str]:
     """Status and reason of a finished fit: a number nobody should trust is not called converged."""
     if solution.status != "converged":
-        return solution.status, solution.reason
+        return solution.status, solution.reason + _texels(unknowns, solution, covariance)
     labels = unknowns.shared_labels()
     for direction in covariance.blind:
         involved = [labels[k] for k in (direction.abs() > _INVOLVED).nonzero()[:, 0].tolist()]
-        if len(involved) == 1:
+        if len(involved) == 1 and not unknowns.own_entries:
             return "not identified", f"{involved[0]} changes nothing in these photographs"
-        return "not identified", f"these photographs cannot tell {' from '.join(involved)}"
+        others = [entry.name for entry in unknowns.own_entries]
+        names = " from ".join([*involved, *(f"the {name} of each texel" for name in others)])
+        return "not identified", f"these photographs cannot tell {names}"
     errors = covariance.shared.diagonal().sqrt() * noise
     position = 0
     verdicts = []
@@ -63,25 +80,42 @@ def judge(unknowns: Unknowns, solution: Solution, covariance: Covariance, noise:
         reasons = [reason for s, reason in found if s == status]
         if reasons:
             return status, "; ".join(reasons)
-    return solution.status, solution.reason
+    return solution.status, solution.reason + _texels(unknowns, solution, covariance)
+
+
+def _texels(unknowns: Unknowns, solution: Solution, covariance: Covariance) -> str:
+    """How many texels have a value that should not be trusted."""
+    if not unknowns.own_entries:
+        return ""
+    lost = (~covariance.own.isfinite()).any(1)
+    on_bound = torch.zeros_like(lost)
+    for entry, raw in unknowns.split_own(solution.own):
+        if isinstance(entry.domain, Interval) and math.isfinite(entry.domain.high):
+            width = entry.domain.high - entry.domain.low
+            on_bound |= (entry.slope(raw) < _FLAT * width).any(1)
+    counts = {"not identified": int(lost.sum()), "on a bound": int((on_bound & ~lost).sum())}
+    notes = [f"{count} of {len(lost)} texels {what}" for what, count in counts.items() if count]
+    return "".join(f", {note}" for note in notes)
 
 
 def _judge_one(entry: Unknown, label: str, raw: Tensor, raw_error: Tensor) -> tuple[str, str] | None:
     domain = entry.domain
-    if domain is None:
+    if not isinstance(domain, Interval):
         return None
     value, error = entry.physical(raw).item(), (entry.slope(raw) * raw_error).item()
     width = domain.high - domain.low
     to_unit = 180 / torch.pi if domain.unit == "rad" else 1.0
     unit = " deg" if domain.unit == "rad" else ""
-    if value in (domain.low, domain.high):
-        return "at bound", f"{label} ran into its bound {value * to_unit:.4g}{unit}"
+    for bound in (domain.low, domain.high):
+        if not domain.even and abs(value - bound) < _FLAT * width:
+            hint = "; are exposure and irradiance right?" if bound == 1 else ""
+            return "at bound", f"{label} ran into its bound {bound * to_unit:.4g}{unit}{hint}"
     if domain.even and value - domain.low < error:
         # the standard error of the square is 2 value error, however small the value
         limit = ((value - domain.low) ** 2 + _ONE_SIDED_95 * 2 * (value - domain.low) * error) ** 0.5
         if limit < _UNINFORMATIVE * width:
             return "at bound", f"{label} cannot be told from {domain.low:g}: below {limit * to_unit:.2g}{unit} at 95 %"
-    if error > _UNINFORMATIVE * width or (width == torch.inf and error > value):
+    if not error <= _UNINFORMATIVE * width or (width == torch.inf and error > value):
         return "not identified", f"the standard error of {label}, {error * to_unit:.2g}{unit}, spans its domain"
     for bound, distance in ((domain.low, value - domain.low), (domain.high, domain.high - value)):
         if distance <= error and not (domain.even and bound == domain.low):

@@ -14,8 +14,12 @@ from tqdm import tqdm
 
 # Steps below this, in the unconstrained coordinates, change nothing that can be seen.
 STEP_TOLERANCE = {torch.float64: 1e-10, torch.float32: 1e-5}
-# A longer step could leap onto the flat end of a parameter's domain, where its derivative is lost.
+# Neither does a relative decrease of the sum of squares below this.
+COST_TOLERANCE = {torch.float64: 1e-12, torch.float32: 1e-7}
+# A longer step could leap onto the flat end of a parameter's domain, where its derivative fades.
 _LONGEST_STEP = 2.0
+# Beyond this coordinate the derivative is lost, and with it the way back.
+_FARTHEST = {torch.float64: 30.0, torch.float32: 14.0}
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-12, 1e12
 _PROGRESS_AFTER_SECONDS = 2.0
 
@@ -61,33 +65,36 @@ class NormalEquations:
             r.square().sum().item(),
         )
 
-    def eliminate(self, damping: float) -> "Eliminated":
-        """Damp (Marquardt's scaling: in proportion to the diagonal) and eliminate the pixels' own unknowns."""
-        own_scale = _scale(self.own)
-        shared_scale = _scale(self.shared)
-        own = self.own / (own_scale[:, :, None] * own_scale[:, None, :])
-        # an unknown that moves nothing keeps its value: unit diagonal, no gradient
-        own = own + torch.diag_embed(torch.where(own.diagonal(dim1=-2, dim2=-1) == 0, 1.0, damping))
-        mixed = self.mixed / (shared_scale[None, :, None] * own_scale[:, None, :])
-        through = torch.linalg.solve(own, mixed.mT) if own.numel() else mixed.mT  # (N, L, G)
-        shared = self.shared / (shared_scale[:, None] * shared_scale)
-        shared = shared + torch.diag(torch.where(shared.diagonal() == 0, 1.0, damping))
-        return Eliminated(shared - torch.einsum("ngl,nlh->gh", mixed, through), through, own, shared_scale, own_scale)
-
     def step(self, damping: float) -> tuple[Tensor, Tensor]:
-        """Damped Gauss-Newton step (shared, own), no entry longer than the longest step."""
-        e = self.eliminate(damping)
-        own = self.own_gradient / e.own_scale
-        shared = self.shared_gradient / e.shared_scale
-        if len(shared):
-            right = shared - torch.einsum("nlg,nl->g", e.through, own)
-            shared = -torch.linalg.lstsq(e.schur, right[:, None]).solution[:, 0]
-        if own.numel():
-            own = -torch.linalg.solve(e.own, own[..., None])[..., 0] - e.through @ shared
-        return (
-            (shared / e.shared_scale).clamp(-_LONGEST_STEP, _LONGEST_STEP),
-            (own / e.own_scale).clamp(-_LONGEST_STEP, _LONGEST_STEP),
-        )
+        """Damped Gauss-Newton step (shared, own) inside the box of the longest step.
+
+        Damping is in proportion to the diagonal (Marquardt). A pixel whose own step leaves the box, near
+        the flat end of a domain, cannot follow the shared unknowns: it is cut, held, and the rest solved anew.
+        """
+        own_scale, shared_scale = scale(self.own), scale(self.shared)
+        own = _damped(self.own / (own_scale[:, :, None] * own_scale[:, None, :]), damping)
+        shared = _damped(self.shared / (shared_scale[:, None] * shared_scale), damping)
+        mixed = self.mixed / (shared_scale[None, :, None] * own_scale[:, None, :])
+        own_gradient, shared_gradient = self.own_gradient / own_scale, self.shared_gradient / shared_scale
+        if not own.numel():
+            found = _boxed_solution(shared, -shared_gradient, _LONGEST_STEP * shared_scale)
+            return found / shared_scale, own_gradient
+        alone = torch.linalg.solve(own, own_gradient[..., None])[..., 0]
+        through = torch.linalg.solve(own, mixed.mT)  # (N, L, G)
+        held = torch.zeros_like(alone)
+        follows = torch.ones(len(own), 1, dtype=torch.bool)
+        while True:
+            following = through * follows[..., None]
+            right = shared_gradient - torch.einsum("ngl,nl->g", mixed, torch.where(follows, alone, -held))
+            schur = shared - torch.einsum("ngl,nlh->gh", mixed, following)
+            d_shared = _boxed_solution(schur, -right, _LONGEST_STEP * shared_scale)
+            d_own = torch.where(follows, -alone - following @ d_shared, held)
+            longest = (d_own / own_scale).abs().amax(1, keepdim=True)
+            leaving = follows & (longest > _LONGEST_STEP)
+            if not leaving.any():
+                return d_shared / shared_scale, d_own / own_scale
+            held = torch.where(leaving, d_own * (_LONGEST_STEP / longest), held)
+            follows = follows & ~leaving
 
     def predicted_decrease(self, shared: Tensor, own: Tensor) -> float:
         """How much the cost would fall along a step if the residuals were linear."""
@@ -98,17 +105,6 @@ class NormalEquations:
             + torch.einsum("nl,nlk,nk->", own, self.own, own)
         )
         return -(2 * slope + curvature).item()
-
-
-@dataclass(frozen=True)
-class Eliminated:
-    """What is left of the normal equations, each unknown scaled to a unit diagonal."""
-
-    schur: Tensor
-    through: Tensor
-    own: Tensor
-    shared_scale: Tensor
-    own_scale: Tensor
 
 
 @dataclass
@@ -134,16 +130,19 @@ def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int)
         found.status, found.reason = "diverged", "the residuals at the start are not finite"
         return found
     damping = _FIRST_DAMPING
-    floor = torch.finfo(dtype).eps * equations.cost  # the cost is not known better than this
     for _ in tqdm(range(max_steps), desc="fit", delay=_PROGRESS_AFTER_SECONDS, leave=False, disable=None):
         found.iterations += 1
         while True:
-            d_shared, d_own = found.equations.step(damping)
-            decrease = found.equations.predicted_decrease(d_shared, d_own)
-            length = max((d.abs().max().item() for d in (d_shared, d_own) if d.numel()), default=0.0)
-            new_shared, new_own = found.shared + d_shared.to(dtype), found.own + d_own.to(dtype)
+            new_shared, new_own = (
+                (x + d.to(dtype)).clamp(-_FARTHEST[dtype], _FARTHEST[dtype])
+                for x, d in zip((found.shared, found.own), found.equations.step(damping), strict=True)
+            )
+            moved = ((new_shared - found.shared).double(), (new_own - found.own).double())
+            decrease = found.equations.predicted_decrease(*moved)
+            length = max((d.abs().max().item() for d in moved if d.numel()), default=0.0)
             cost = residual(new_shared, new_own).double().square().sum().item()
-            negligible = length < STEP_TOLERANCE[dtype] or decrease <= torch.finfo(dtype).eps * found.equations.cost
+            small = 0 <= decrease <= COST_TOLERANCE[dtype] * found.equations.cost
+            negligible = small or length < STEP_TOLERANCE[dtype]
             if cost <= found.equations.cost or negligible or damping > _MOST_DAMPING:
                 break
             damping *= 4
@@ -152,7 +151,7 @@ def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int)
             found.equations = NormalEquations.of(residual, new_shared, new_own)
             damping = max(damping / 10, _LEAST_DAMPING)
         found.history.append(found.equations.cost)
-        if negligible or found.equations.cost <= floor * floor:
+        if negligible:
             found.status, found.reason = "converged", f"after {found.iterations} steps"
             return found
         if damping > _MOST_DAMPING:
@@ -161,10 +160,36 @@ def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int)
     return found
 
 
+def _damped(matrix: Tensor, damping: float) -> Tensor:
+    """A matrix of unit diagonal, damped; an unknown that moves nothing has a zero there and keeps its value."""
+    diagonal = matrix.diagonal(dim1=-2, dim2=-1)
+    return matrix + torch.diag_embed(torch.where(diagonal == 0, 1.0, damping))
+
+
+def _boxed_solution(matrix: Tensor, right: Tensor, limit: Tensor) -> Tensor:
+    """Solve matrix x = right with |x| <= limit: the worst offender is put on its limit, the rest solved anew.
+
+    Clamping the entries of the free solution instead would turn the step, even uphill.
+    """
+    solution = torch.zeros_like(right)
+    free = torch.ones_like(right, dtype=torch.bool)
+    while free.any():
+        remaining = right[free] - matrix[free][:, ~free] @ solution[~free]
+        solution[free] = torch.linalg.lstsq(matrix[free][:, free], remaining[:, None]).solution[:, 0]
+        excess = (solution.abs() / limit).masked_fill(~free, 0.0)
+        if excess.max() <= 1:
+            break
+        worst = int(excess.argmax())
+        solution[worst] = solution[worst].sign() * limit[worst]
+        free[worst] = False
+    return solution
+
+
 def _derivative(residual: Residual, shared: Tensor, own: Tensor, d_shared: Tensor, d_own: Tensor) -> Tensor:
     return torch.func.jvp(residual, (shared, own), (d_shared, d_own))[1].double()
 
 
-def _scale(matrix: Tensor) -> Tensor:
+def scale(matrix: Tensor) -> Tensor:
+    """Root of the diagonal (..., n), 1 where it is 0."""
     diagonal = matrix.diagonal(dim1=-2, dim2=-1)
     return torch.where(diagonal > 0, diagonal, 1.0).sqrt()

@@ -21,11 +21,12 @@ class Distant:
 
     def __post_init__(self):
         direction = torch.as_tensor(self.direction)
+        if not direction.is_floating_point():
+            direction = direction.double()
         length = direction.norm()
         if direction.shape != (3,) or not length.isfinite() or length == 0:
             raise ValueError(f"Distant.direction must be a finite non-zero vector (3,); found {self.direction}.")
-        if not (torch.as_tensor(self.irradiance) >= 0).all():
-            raise ValueError(f"Distant.irradiance must not be negative; found {self.irradiance}.")
+        _check_strength("Distant.irradiance", self.irradiance)
         object.__setattr__(self, "direction", direction / length)
 
     @classmethod
@@ -42,8 +43,13 @@ class Ambient:
     radiance: Tensor | float = 1.0
 
     def __post_init__(self):
-        if not (torch.as_tensor(self.radiance) >= 0).all():
-            raise ValueError(f"Ambient.radiance must not be negative; found {self.radiance}.")
+        _check_strength("Ambient.radiance", self.radiance)
+
+
+def _check_strength(name: str, value: Tensor | float) -> None:
+    strength = torch.as_tensor(value)
+    if not (strength.isfinite() & (strength >= 0)).all():
+        raise ValueError(f"{name} must be finite and not negative; found {value}.")
 
 
 Light = Distant | Ambient

@@ -68,23 +68,22 @@ def residual_figure(
     figure, axes = plt.subplots(
         1, len(renderings) + 2, figsize=(3.2 * (len(renderings) + 2), 3.2), layout="constrained"
     )
-    axes[0].imshow(photographs[0].mean(-1).numpy(), cmap="gray")
+    seen = scene.surface.coverage() > 0
+    window = tuple(slice(int(k.nonzero()[0]), int(k.nonzero()[-1]) + 1) for k in (seen.any(1), seen.any(0)))
+    axes[0].imshow(photographs[0].mean(-1)[window].numpy(), cmap="gray")
     axes[0].set_title("photograph 0", fontsize=10)
-    limit = 3 * (photographs - next(iter(renderings.values())))[valid].std().item()
+    limit = 3 * (photographs - next(iter(renderings.values())))[valid].square().mean().sqrt().item()
     angles = torch.stack([_light_angle(scene, k) for k in range(scene.images)])
     edges = torch.linspace(0, 75, 16)
     for axis, colour, (label, stack) in zip(axes[1:], _LINES, renderings.items(), strict=False):
         residual = (photographs - stack).mean(-1)
-        shown = residual[0].masked_fill(~valid[0], torch.nan)
-        picture = axis.imshow(shown.numpy(), cmap="RdBu_r", vmin=-limit, vmax=limit)
+        shown = residual[0].masked_fill(~valid[0], torch.nan)[window]
+        axis.imshow(shown.numpy(), cmap="RdBu_r", vmin=-limit, vmax=limit)
         rms = residual[valid].square().mean().sqrt().item()
         axis.set_title(f"minus {label}, rms {rms:.4f}", fontsize=10)
-        means = [
-            residual[valid & (angles >= low) & (angles < high)].mean().item()
-            for low, high in pairwise(edges)
-        ]
+        means = [residual[valid & (angles >= low) & (angles < high)].mean().item() for low, high in pairwise(edges)]
         axes[-1].plot((edges[:-1] + edges[1:]) / 2, means, ".-", color=colour, label=label)
-    figure.colorbar(picture, ax=axes[len(renderings)], shrink=0.8)
+    figure.colorbar(axes[1].images[0], ax=axes[len(renderings)], shrink=0.8)
     for axis in axes[:-1]:
         axis.set_axis_off()
     axes[-1].set(xlabel="angle of the light [deg]", title="mean residual, all images")

@@ -54,7 +54,8 @@ class FitResult:
                 rows.append(("correlation", f"{self.correlation[i, j]:+.2f} ({self.names[i]}, {self.names[j]})"))
         rows.append(("residual rms", f"{self.residual_rms:.3g} of full scale, {self.samples} samples"))
         rows.append(("status", f"{self.status}: {self.reason} ({self.seconds:.2f} s)"))
-        return "\n".join(f"{name:<14}{text}" for name, text in rows)
+        width = max(14, *(len(name) + 2 for name, _ in rows))
+        return "\n".join(f"{name:<{width}}{text}" for name, text in rows)
 
     def estimate(self, name: str) -> str:
         """A parameter and its standard error as text, angles in degrees; a summary of a per-texel one."""

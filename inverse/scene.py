@@ -16,7 +16,7 @@ class Scene:
         surface: known geometry.
         lights: for each image its lights; on construction a single light may stand for a set of one.
         sensor: the fit uses its exposure and point-spread function.
-    Raises: ValueError when there is no image.
+    Raises: ValueError when there is no image; TypeError for a light outside a sequence.
     """
 
     surface: Surface
@@ -24,6 +24,8 @@ class Scene:
     sensor: Sensor
 
     def __init__(self, surface: Surface, lights: Sequence[Light | Sequence[Light]], sensor: Sensor | None = None):
+        if isinstance(lights, Distant | Ambient):
+            raise TypeError("Scene.lights must be a sequence with one entry for each image; found a single light.")
         sets = tuple((entry,) if isinstance(entry, Distant | Ambient) else tuple(entry) for entry in lights)
         if not sets or not all(sets):
             raise ValueError("Scene.lights must hold at least one image and one light for each; found none.")

@@ -27,7 +27,7 @@ class Sensor:
 
     def __post_init__(self):
         rules = {
-            "exposure must be positive": self.exposure > 0,
+            "exposure must be positive and finite": 0 < self.exposure < float("inf"),
             "psf_sigma must not be negative [pixel]": self.psf_sigma >= 0,
             "read_noise must not be negative [full scale]": self.read_noise >= 0,
             "full_well must be positive [electrons]": self.full_well is None or self.full_well > 0,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from torchbrdf import BRDF, Interval, trainable
+from torchbrdf import BRDF, Interval, Simplex, trainable
 
 _EXPOSURE = Interval(0.0, torch.inf)
 
@@ -16,7 +16,7 @@ class Unknown:
 
     name: str
     raw_name: str
-    domain: Interval | None
+    domain: Interval | Simplex | None
     start: Tensor
     per_texel: bool
 
@@ -29,11 +29,20 @@ class Unknown:
         return torch.func.jvp(self.physical, (raw,), (torch.ones_like(raw),))[1]
 
     def physical_error(self, raw: Tensor, raw_error: Tensor) -> Tensor:
-        """Error of the value from that of its coordinate; infinite on a bound, and where it exceeds the domain."""
-        slope = self.slope(raw)
-        error = slope * raw_error.to(raw.dtype)
-        width = torch.inf if self.domain is None else self.domain.high - self.domain.low
-        return torch.where((slope > 0) & (error <= width), error, torch.inf)
+        """Error of the value from that of its coordinate; infinite where it exceeds what the domain allows."""
+        error = self.slope(raw) * raw_error.to(raw.dtype)
+        if self.domain is None:
+            return error
+        # where only the square is told from 0, an error larger than the value has no symmetric meaning
+        largest = self.physical(raw) - self.domain.low if self.domain.even else self.domain.high - self.domain.low
+        return error.masked_fill(~(error <= largest), torch.inf)
+
+    def shared_error(self, raw: Tensor, covariance: Tensor) -> Tensor:
+        """Error of each entry of a shared value from the covariance of its coordinates."""
+        if not isinstance(self.domain, Simplex):
+            return self.physical_error(raw, covariance.diagonal().sqrt())
+        slopes = torch.func.jacfwd(self.physical)(raw).to(covariance.dtype)  # shares depend on all coordinates
+        return torch.einsum("ij,jk,ik->i", slopes, covariance, slopes).sqrt().to(raw.dtype)
 
     def labels(self) -> list[str]:
         """A name for each entry of a shared unknown."""
@@ -48,7 +57,7 @@ class Unknowns:
     Args:
         model: whose trainable parameters are fitted.
         texels: for each used pixel, its position among the masked points (P,).
-        points: number of masked points; a parameter whose first dimension is that number is per texel.
+        points: number of masked points; a per-texel parameter has one entry for each.
         images: number of images; exposure is relative to the first image's.
     """
 
@@ -59,10 +68,25 @@ class Unknowns:
         self.entries = []
         for name, (raw_name, domain) in trainable(model).items():
             start = raw[raw_name].detach()
-            per_texel = start.ndim > 0 and start.shape[0] == points > 1
+            per_texel = start.ndim > domain.trailing
+            if per_texel and (start.ndim != domain.trailing + 1 or start.shape[0] != points):
+                wanted = f"({points}, channel)" if domain.trailing else f"({points},)"
+                raise ValueError(
+                    f"{name} must be per texel {wanted}, one for each of the {points} masked points, or shared; "
+                    f"found shape {tuple(start.shape)}."
+                )
+            if per_texel and isinstance(domain, Simplex):
+                raise ValueError(f"{name} cannot be fitted per texel: its shares are not independent.")
             self.entries.append(Unknown(name, raw_name, domain, start, per_texel))
+        known = {entry.raw_name for entry in self.entries}
+        strangers = [name for name, p in model.named_parameters() if p.requires_grad and name not in known]
+        if strangers:
+            raise ValueError(
+                f"{type(model).__name__} has trainable parameters outside its table: {', '.join(strangers)}. "
+                "Declare them as Constrained in the class body, or hold them with requires_grad_(False)."
+            )
         blank = texels.new_zeros(images, dtype=self.entries[0].start.dtype if self.entries else torch.float32)
-        if free_exposure:
+        if free_exposure and images > 1:
             self.entries.append(Unknown("exposure", "", _EXPOSURE, blank[1:], False))
         if free_ambient:
             self.entries.append(Unknown("ambient", "", None, blank, False))

@@ -4,6 +4,8 @@ Each primitive keeps the value exact where the mathematics defines one, and guar
 where the mathematics has a limit that floating point cannot take.
 """
 
+import math
+
 import numpy as np
 import torch
 from numpy.polynomial import Chebyshev, Polynomial
@@ -66,6 +68,13 @@ def dot(a: Tensor, b: Tensor) -> Tensor:
     return ax * bx + ay * by + az * bz
 
 
+def cross(a: Tensor, b: Tensor) -> Tensor:
+    """Cross product of (..., 3) vectors that broadcast."""
+    ax, ay, az = a.unbind(-1)
+    bx, by, bz = b.unbind(-1)
+    return torch.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), -1)
+
+
 def safe_sqrt(x: Tensor) -> Tensor:
     """sqrt(x), and 0 with zero gradient where rounding left x at or below 0."""
     empty = x <= 0
@@ -75,6 +84,40 @@ def safe_sqrt(x: Tensor) -> Tensor:
 def safe_divide(numerator: Tensor, denominator: Tensor, *, where: Tensor) -> Tensor:
     """numerator / denominator where the mask holds, else 0 with zero gradient; masked before dividing."""
     return (numerator / denominator.masked_fill(~where, 1.0)).masked_fill(~where, 0.0)
+
+
+def safe_atan2(y: Tensor, x: Tensor) -> Tensor:
+    """Polar angle of (x, y) in (-pi, pi]; 0 with zero gradient at the origin, where it has no meaning. [rad]"""
+    origin = (x == 0) & (y == 0)
+    return torch.atan2(y.masked_fill(origin, 0.0), x.masked_fill(origin, 1.0))
+
+
+def arcsec(x: Tensor) -> Tensor:
+    """acos(1/x) for x > 1 and 0 below, with zero gradient at x = 1. [rad] in [0, pi/2)
+
+    By atan, which keeps the digits near x = 1 that acos(1/x) loses.
+    """
+    return torch.atan(safe_sqrt((x - 1) * (x + 1)))
+
+
+def arccsc(x: Tensor) -> Tensor:
+    """asin(1/x) for x > 1 and pi/2 below: the complement of `arcsec`, exact for large x. [rad] in (0, pi/2]"""
+    return torch.atan2(torch.ones_like(x), safe_sqrt((x - 1) * (x + 1)))
+
+
+def sinc(x: Tensor) -> Tensor:
+    """sin(x)/x, 1 at 0, smooth to every order in reverse and forward mode."""
+    return torch.sinc(x / math.pi)
+
+
+def positive(x: Tensor) -> Tensor:
+    """x, and the smallest normal number where x is below it: what a logarithm or a root may be given."""
+    return x.clamp(min=torch.finfo(x.dtype).tiny)
+
+
+def quiet_width(dtype: torch.dtype) -> float:
+    """Width w (in standard deviations) beyond which exp(-w*w/2) underflows. [-]"""
+    return math.sqrt(-2 * math.log(torch.finfo(dtype).tiny))
 
 
 def angle_over_sine(cosine: Tensor) -> Tensor:

@@ -2,28 +2,27 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor, nn
 
-from torchbrdf._numerics import safe_divide, safe_sqrt
-from torchbrdf.directions import Cosines, any_tangent, cross, orthonormal_tangent
+from torchbrdf._numerics import safe_sqrt
+from torchbrdf.directions import Cosines
 from torchbrdf.parameters import WEIGHT, Constrained, Parametric
-from torchbrdf.sampling import Sample, choose, cosine_hemisphere, uniform_hemisphere
+from torchbrdf.sampled import Sampled, propose_from_parts
+
+PIXELS_AT_A_TIME = 4096
 
 
-class BRDF(Parametric, ABC):
+class BRDF(Sampled, Parametric, ABC):
     """Bidirectional reflectance distribution function f_r [1/sr], cosine not included.
 
-    Subclasses implement `evaluate_components`, and `propose` with `density` where drawing from the cosine
-    (and a `uniform_share` of the hemisphere, which bounds the weights at grazing views) is not good enough.
-    Sums and multiples are BRDFs again: `0.7 * OrenNayar() + 0.3 * Lambert()` has two trainable weights.
+    Subclasses implement `evaluate_components`, and `propose` with `density` where the sampling of `Sampled` is not
+    good enough. Sums and multiples are BRDFs again:
+    `0.7 * OrenNayar() + 0.3 * Lambert()` has two trainable weights.
     """
-
-    anisotropic: bool = False
-    uniform_share: float = 0.0
 
     def forward(
         self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
@@ -31,8 +30,8 @@ class BRDF(Parametric, ABC):
         """f_r (..., channel) [1/sr] for unit vectors (..., 3) that leave the surface.
 
         Zero, with zero gradient, unless light and view are both above the horizon. Raises what
-        `Cosines.of` raises; `normalize=True` scales the vectors to unit length first. Anisotropic models
-        need the `tangent` (..., 3) along which the surface is aligned.
+        `Cosines.of` raises; `normalize=True` scales the vectors to unit length first. Anisotropic
+        models need a tangent (..., 3); the others ignore it.
         """
         return self.evaluate(self.cosines(normal, light, view, tangent=tangent, normalize=normalize))
 
@@ -41,7 +40,7 @@ class BRDF(Parametric, ABC):
     ) -> Cosines:
         """What the model reads of the directions; raises ValueError where it misses a tangent."""
         if self.anisotropic and tangent is None:
-            raise ValueError(f"{type(self).__name__} is anisotropic and needs a tangent: pass tangent=... (..., 3).")
+            raise ValueError(self.missing_tangent())
         return Cosines.of(normal, light, view, tangent=tangent, normalize=normalize)
 
     def components(
@@ -77,74 +76,19 @@ class BRDF(Parametric, ABC):
         # d(cos_light) d(dphi) over half the circle of azimuths, which the other half mirrors
         weight = cos_light * (w_light / 2) * (w_dphi / 2 * math.pi) * 2
         sin_view, sin_light = (safe_sqrt((1 - c) * (1 + c)) for c in (cos_view, cos_light))
-        along = sin_light * dphi.cos()
-        # the view lies in the plane of the tangent
-        planar = (along, sin_light * dphi.sin(), sin_view, torch.zeros_like(sin_view)) if self.anisotropic else None
-        cosines = Cosines.from_products(cos_light, cos_view, cos_light * cos_view + sin_view * along, in_plane=planar)
-        return (self.evaluate(cosines) * weight[..., None]).sum((0, 1))
-
-    def sample(self, normal: Tensor, view: Tensor, u: Tensor, *, tangent: Tensor | None = None) -> Sample:
-        """Light directions drawn for unit normals and views (..., 3) from u (..., 2) uniform in [0, 1).
-
-        The weight f_r cos/pdf is an unbiased estimate of the directional albedo; see `Sample`. Raises what
-        `Cosines.of` raises.
-        """
-        with torch.no_grad():
-            t = self._frame(normal, view, tangent)
-            axes = torch.stack((t, cross(normal, t), normal.expand_as(t)), -1)
-            local = (axes * view[..., :, None]).sum(-2)
-            proposed, delta = self.propose(local, u)
-            light = (axes * proposed[..., None, :]).sum(-1)
-            light = light / light.norm(dim=-1, keepdim=True)
-        cosines = Cosines.of(normal, light, view, tangent=t)
-        with torch.no_grad():
-            pdf = self.density(cosines).masked_fill(~cosines.above_horizon, 0.0)
-        factor = safe_divide(cosines.light, pdf, where=pdf > 0).detach()
-        weight = self.evaluate(cosines) * factor[..., None]
-        mirror = self.delta_reflectance(cosines)
-        if mirror is not None:
-            delta = delta & cosines.above_horizon
-            probability = self.delta_probability(cosines)
-            mirror = safe_divide(mirror, probability[..., None], where=(probability > 0)[..., None])
-            weight = torch.where(delta[..., None], mirror, weight)
-            pdf = pdf.masked_fill(delta, math.inf)
-        return Sample(light, pdf, weight)
-
-    def pdf(self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None) -> Tensor:
-        """Density [1/sr] (...) with which `sample` draws the light; 0 below the horizon, delta lobes left out."""
-        with torch.no_grad():
-            cosines = Cosines.of(normal, light, view, tangent=self._frame(normal, view, tangent))
-            return self.density(cosines).masked_fill(~cosines.above_horizon, 0.0)
-
-    def propose(self, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:
-        """Light (..., 3) for a view (..., 3), both in the frame (tangent, bitangent, normal), and whether it is
-        a mirror direction (...). Called without gradients."""
-        uniform, u1 = choose(u[..., 0], torch.full_like(u[..., 0], self.uniform_share))
-        u = torch.stack((u1, u[..., 1]), -1)
-        light = torch.where(uniform[..., None], uniform_hemisphere(u), cosine_hemisphere(u))
-        light = light.expand(torch.broadcast_shapes(light.shape, view.shape))
-        return light, torch.zeros_like(light[..., 0], dtype=torch.bool)
-
-    def density(self, cosines: Cosines) -> Tensor:
-        """Density [1/sr] (...) of `propose`, delta lobes left out; the cosines carry a tangent."""
-        return (self.uniform_share / 2 + (1 - self.uniform_share) * cosines.light) / math.pi
-
-    def delta_reflectance(self, cosines: Cosines) -> Tensor | None:
-        """Reflectance (..., channel) of the mirror lobe, which `forward` cannot show; None without one. [-]"""
-        return None
-
-    def delta_probability(self, cosines: Cosines) -> Tensor:
-        """Probability (...) with which `propose` returns the mirror direction."""
-        return torch.zeros_like(cosines.view)
-
-    def _frame(self, normal: Tensor, view: Tensor, tangent: Tensor | None) -> Tensor:
-        if tangent is not None:
-            t = orthonormal_tangent(normal, tangent)
-        elif self.anisotropic:
-            raise ValueError(f"{type(self).__name__} is anisotropic and needs a tangent: pass tangent=... (..., 3).")
+        if self.anisotropic:  # the view lies in the plane of normal and tangent
+            weight = torch.cat((weight, weight), 1) / 2
+            turn = torch.cat((dphi, -dphi), 1)
+            light = (sin_light * turn.cos(), sin_light * turn.sin(), cos_light)
+            vectors = [
+                torch.stack(torch.broadcast_tensors(*v), -1) for v in (light, (sin_view, 0 * sin_view, cos_view))
+            ]
+            x, _, z = torch.eye(3, dtype=cos_view.dtype, device=cos_view.device)
+            cosines = Cosines.of(z, *vectors, tangent=x, normalize=True)
         else:
-            t = any_tangent(normal)
-        return t.expand(torch.broadcast_shapes(t.shape, view.shape))
+            phase = cos_light * cos_view + sin_view * sin_light * dphi.cos()
+            cosines = Cosines.from_products(cos_light, cos_view, phase)
+        return (self.evaluate(cosines) * weight[..., None]).sum((0, 1))
 
     def __mul__(self, weight: Tensor | float) -> "WeightedSum":
         return WeightedSum([self], [weight])
@@ -190,9 +134,53 @@ class LinearBRDF(BRDF):
         return {name: _contract(c, terms) for name, c in self.component_coefficients().items()}
 
 
+class ImageBRDF(LinearBRDF):
+    """A `LinearBRDF` of many terms, made and contracted as one tensor, some pixels at a time.
+
+    A model states what its images read of the directions and what they are. Working memory without
+    derivatives is that of `PIXELS_AT_A_TIME` pixels, plus K numbers a pixel where `basis` is asked for.
+    """
+
+    @abstractmethod
+    def coordinates(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        """What the images read of the directions, each (...)."""
+
+    @abstractmethod
+    def images(self, *coordinates: Tensor) -> Tensor:
+        """The terms (..., K) at coordinates (...); finite, but arbitrary below the horizon."""
+
+    def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        return _in_pieces(self.images, self.coordinates(cosines)).unbind(-1)
+
+    def basis(self, cosines: Cosines) -> Tensor:
+        return cosines.zero_below_horizon(_in_pieces(self.images, self.coordinates(cosines)))
+
+    def evaluate(self, cosines: Cosines) -> Tensor:
+        return cosines.zero_below_horizon(self._seen_by(self.coefficients(), cosines))
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        coefficients = self.component_coefficients()
+        together = torch.cat(list(coefficients.values()), -2)
+        channels = [c.shape[-2] for c in coefficients.values()]
+        parts = self._seen_by(together, cosines).split(channels, -1)
+        return dict(zip(coefficients, parts, strict=True))
+
+    def _seen_by(self, coefficients: Tensor, cosines: Cosines) -> Tensor:
+        """Images times coefficients (..., channel, K), without keeping the images."""
+        coordinates = self.coordinates(cosines)
+        if coefficients.ndim == 2:
+            return _in_pieces(lambda *c: self.images(*c) @ coefficients.mT, coordinates)
+        shape = torch.broadcast_shapes(coordinates[0].shape, coefficients.shape[:-2])
+        rows = coefficients.expand(*shape, *coefficients.shape[-2:])
+        wide = tuple(c.expand(shape) for c in coordinates)
+        return _in_pieces(lambda row, *c: torch.einsum("...k,...ck->...c", self.images(*c), row), (rows, *wide))
+
+
 class WeightedSum(BRDF):
     """Sum of BRDFs with trainable positive weights (part,). Components are named `Model.part`.
 
+    A weight and the albedo of its part say the same thing: hold one of them `fixed` before fitting. The
+    weights of a sum made by + and * are trainable; assign `sum.weights = fixed(...)` to hold them.
     Whether the sum reflects more than it receives is the weights' business: nothing bounds their sum.
     Raises ValueError for a weight that is not positive and finite, or counts that differ; TypeError
     for parts that are not BRDFs.
@@ -232,18 +220,7 @@ class WeightedSum(BRDF):
         )
 
     def propose(self, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:
-        """Draws from one part, chosen in proportion to the weights."""
-        parts, shares = self._brdfs(), self._shares()
-        u1, start = u[..., 0], torch.zeros_like(shares[0])
-        light, delta = torch.zeros_like(view), torch.zeros_like(view[..., 0], dtype=torch.bool)
-        for part, share in zip(parts, shares, strict=True):
-            # the part whose share of [0, 1) holds u1 draws from where in it u1 lies
-            within = ((u1 - start) / share).clamp(0.0, 1 - torch.finfo(u.dtype).eps)
-            here, is_delta = part.propose(view, torch.stack((within, u[..., 1]), -1))
-            inside = (u1 >= start).expand(is_delta.shape)
-            light, delta = torch.where(inside[..., None], here, light), torch.where(inside, is_delta, delta)
-            start = start + share
-        return light, delta
+        return propose_from_parts(self._brdfs(), self._shares(), view, u)
 
     def density(self, cosines: Cosines) -> Tensor:
         return _sum([p * part.density(cosines) for part, p in zip(self._brdfs(), self._shares(), strict=True)])
@@ -265,20 +242,29 @@ class WeightedSum(BRDF):
         return (self.weights / self.weights.sum()).detach()
 
     def __mul__(self, weight: Tensor | float) -> "WeightedSum":
-        return WeightedSum(list(self.parts), self.weights * weight)  # pyright: ignore[reportArgumentType]
+        return WeightedSum(list(self.parts), self.weights.detach() * weight)  # pyright: ignore[reportArgumentType]
 
     __rmul__ = __mul__
 
     def __add__(self, other: BRDF) -> "WeightedSum":
-        parts, weights = [*self.parts], [*self.weights]
+        parts, weights = [*self.parts], [*self.weights.detach()]
         if isinstance(other, WeightedSum):
-            return WeightedSum([*parts, *other.parts], [*weights, *other.weights])  # pyright: ignore
+            return WeightedSum([*parts, *other.parts], [*weights, *other.weights.detach()])  # pyright: ignore
         return WeightedSum([*parts, other], [*weights, 1.0])  # pyright: ignore[reportArgumentType]
 
 
 def _contract(coefficients: Tensor, terms: tuple[Tensor, ...]) -> Tensor:
     """sum_k coefficients[..., k] * terms[k] (..., channel), without stacking the terms."""
     return _sum([c * t[..., None] for c, t in zip(coefficients.unbind(-1), terms, strict=True)])
+
+
+def _in_pieces(compute: Callable[..., Tensor], inputs: tuple[Tensor, ...]) -> Tensor:
+    """compute(*inputs) over many pixels, some at a time; the last input's shape (...) leads in all of them."""
+    shape = inputs[-1].shape
+    if torch.compiler.is_compiling() or shape.numel() <= PIXELS_AT_A_TIME:
+        return compute(*inputs)
+    pieces = zip(*(t.flatten(0, len(shape) - 1).split(PIXELS_AT_A_TIME) for t in inputs), strict=True)
+    return torch.cat([compute(*piece) for piece in pieces]).unflatten(0, shape)
 
 
 def _sum(values) -> Tensor:

@@ -1,7 +1,8 @@
 """Directions at a surface point, reduced to the three cosines every isotropic model reads."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -9,6 +10,7 @@ from torch import Tensor
 from torchbrdf._numerics import (
     SUPPORTED_DTYPES,
     angle_over_sine,
+    cross,
     dot,
     holds,
     horizon,
@@ -18,14 +20,23 @@ from torchbrdf._numerics import (
 )
 
 
+class TangentPlane(NamedTuple):
+    """Components of light and view along the tangent t and the bitangent b = normal x t, each (...). [-]"""
+
+    light_tangent: Tensor
+    light_bitangent: Tensor
+    view_tangent: Tensor
+    view_bitangent: Tensor
+
+
 class _computed_once:  # noqa: N801 - used as a decorator
     """`functools.cached_property` without the lock that torch.compile cannot enter."""
 
-    def __init__(self, compute: "Callable[[Cosines], Tensor]"):
+    def __init__(self, compute: "Callable[[Cosines], Any]"):
         self.compute = compute
         self.name = compute.__name__
 
-    def __get__(self, instance: "Cosines", owner: type) -> Tensor:
+    def __get__(self, instance: "Cosines", owner: type) -> Any:
         value = self.compute(instance)
         instance.__dict__[self.name] = value  # found before this descriptor from now on
         return value
@@ -46,18 +57,16 @@ class Cosines:
         view: normal . view (...). [-]
         phase: light . view (...). [-]
         above_horizon: where both light and view are above the horizon (...).
-        light_tangent, light_bitangent, view_tangent, view_bitangent: components of light and view along the
-            tangent and along normal x tangent (...); None when no tangent was given. 0 below the horizon.
+        vectors: normal, light and view (..., 3) themselves, if known: for what is computed on demand.
+        tangent: of the surface (..., 3), if given; not orthonormalised yet.
     """
 
     light: Tensor
     view: Tensor
     phase: Tensor
     above_horizon: Tensor
-    light_tangent: Tensor | None = None
-    light_bitangent: Tensor | None = None
-    view_tangent: Tensor | None = None
-    view_bitangent: Tensor | None = None
+    vectors: tuple[Tensor, Tensor, Tensor] | None = None
+    tangent: Tensor | None = None
 
     @classmethod
     def of(
@@ -67,14 +76,14 @@ class Cosines:
 
         Args:
             normal, light, view: unit vectors (..., 3), float32 or float64, all of one dtype.
-            tangent: direction (..., 3) of any length along which an anisotropic surface is aligned; its part
-                along the normal is removed.
+            tangent: vectors (..., 3) in no direction parallel to the normal, for anisotropic models: of each,
+                the part along the surface counts, scaled to unit length. Isotropic models ignore it.
             normalize: scale the vectors to unit length instead of refusing others.
         Raises:
             TypeError: a dtype other than float32 and float64 (half types lose up to 20 % at grazing
                 angles), or dtypes that differ.
             ValueError: a trailing dimension other than 3, shapes that do not broadcast, entries that
-                are not finite, vectors that are not of unit length, or a tangent parallel to the normal.
+                are not finite, or vectors that are not of unit length.
         """
         vectors = {"normal": normal, "light": light, "view": view}
         _check_shapes(vectors if tangent is None else vectors | {"tangent": tangent})
@@ -84,38 +93,53 @@ class Cosines:
             for name, v in vectors.items():
                 _check_unit(name, v)
         n, s, v = vectors.values()
-        products = (dot(n, s), dot(n, v), dot(s, v))
-        if tangent is None:
-            return cls.from_products(*products)
-        t = orthonormal_tangent(n, tangent)
-        b = cross(n, t)
-        return cls.from_products(*products, in_plane=(dot(t, s), dot(b, s), dot(t, v), dot(b, v)))
+        found = cls.from_products(dot(n, s), dot(n, v), dot(s, v))
+        return replace(found, vectors=(n, s, v), tangent=tangent)
 
     @classmethod
-    def from_products(
-        cls,
-        light: Tensor,
-        view: Tensor,
-        phase: Tensor,
-        *,
-        in_plane: tuple[Tensor, Tensor, Tensor, Tensor] | None = None,
-    ) -> "Cosines":
-        """From the three dot products themselves (...), unchecked.
-
-        `in_plane`: light_tangent, light_bitangent, view_tangent, view_bitangent, where a tangent is known.
-        """
-        light, view, phase, *planar = torch.broadcast_tensors(light, view, phase, *(in_plane or ()))
+    def from_products(cls, light: Tensor, view: Tensor, phase: Tensor) -> "Cosines":
+        """From the three dot products themselves (...), unchecked."""
+        light, view, phase = torch.broadcast_tensors(light, view, phase)
         limit = horizon(light.dtype)
         above = (light > limit) & (view > limit)
         below = ~above
-        light, view, phase = (x.masked_fill(below, 1.0) for x in (light, view, phase))
-        if not planar:
-            return cls(light, view, phase, above)
-        return cls(light, view, phase, above, *(x.masked_fill(below, 0.0) for x in planar))
+        return cls(light.masked_fill(below, 1.0), view.masked_fill(below, 1.0), phase.masked_fill(below, 1.0), above)
 
     def zero_below_horizon(self, brdf: Tensor) -> Tensor:
         """brdf (..., channel) where light and view are above the horizon, else 0 with zero gradient."""
         return brdf.masked_fill(~self.above_horizon[..., None], 0.0)
+
+    @_computed_once
+    def azimuth_sine(self) -> Tensor:
+        """sin(alpha) sin(beta) |sin(dphi)| (...): |normal . (light x view)|; zero subgradient where it is 0.
+
+        From the vectors where they are known, else as the root of a determinant that loses half the
+        digits where it is small.
+        """
+        if self.vectors is not None:
+            n, s, v = self.vectors
+            volume = dot(n, cross(s, v)).masked_fill(~self.above_horizon, 0.0)
+            return volume.abs()
+        squares = self.light * self.light + self.view * self.view + self.phase * self.phase
+        return safe_sqrt(1 - squares + 2 * self.light * self.view * self.phase)
+
+    @_computed_once
+    def tangent_plane(self) -> TangentPlane:
+        """Components of light and view along tangent and bitangent; 0 below the horizon.
+
+        Raises ValueError where no tangent was given, or where it is parallel to the normal.
+        """
+        if self.vectors is None or self.tangent is None:
+            raise ValueError(
+                "an anisotropic model needs a tangent: pass tangent=(..., 3), a direction along the surface, "
+                "to the model or to Cosines.of."
+            )
+        normal, *directions = self.vectors
+        tangent = orthonormal_tangent(normal, self.tangent)
+        bitangent = cross(normal, tangent)
+        below = ~self.above_horizon
+        parts = [dot(along, direction) for direction in directions for along in (tangent, bitangent)]
+        return TangentPlane(*(part.masked_fill(below, 0.0) for part in parts))
 
     @_computed_once
     def alpha(self) -> Tensor:
@@ -164,28 +188,20 @@ class Cosines:
         return angle_over_sine(self.beta)
 
 
-def cross(a: Tensor, b: Tensor) -> Tensor:
-    """Vector product of (..., 3), broadcasting."""
-    ax, ay, az = a.unbind(-1)
-    bx, by, bz = b.unbind(-1)
-    return torch.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), -1)
-
-
 def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
     """Unit vector (..., 3) along the part of `tangent` that is perpendicular to the unit normal.
 
     Raises: ValueError where the tangent is (within rounding) parallel to the normal, 0 or not finite.
     """
-    t = _normalized("tangent", tangent)
-    across = t - dot(t, normal)[..., None] * normal
-    squared = dot(across, across)
-    usable = squared > unit_tolerance(t.dtype) ** 2
-    if not holds(usable):
+    bitangent = cross(normal, _normalized("tangent", tangent))
+    squared = dot(bitangent, bitangent)
+    parallel = squared <= unit_tolerance(squared.dtype) ** 2
+    if not holds(~parallel):
         raise ValueError(
-            f"tangent must not be parallel to the normal; {int((~usable).sum())} of {usable.numel()} are. "
-            "Pass a direction that lies in the surface."
+            f"tangent must not be parallel to the normal; {int(parallel.sum())} of {parallel.numel()} are. "
+            "Choose a direction along the surface."
         )
-    return across / squared.masked_fill(~usable, 1.0).sqrt()[..., None]
+    return cross(bitangent / squared.sqrt()[..., None], normal)
 
 
 def any_tangent(normal: Tensor) -> Tensor:
@@ -209,16 +225,16 @@ def _check_shapes(vectors: dict[str, Tensor]) -> None:
             raise ValueError(f"{name} must have shape (..., 3); found {tuple(v.shape)}.")
     if len({v.dtype for v in vectors.values()}) > 1:
         found = ", ".join(f"{name} {v.dtype}" for name, v in vectors.items())
-        raise TypeError(f"{_list(vectors)} must share one dtype; found {found}.")
+        raise TypeError(f"{_listed(vectors)} must share one dtype; found {found}.")
     shapes = [v.shape for v in vectors.values()]
     try:
         torch.broadcast_shapes(*shapes)
     except RuntimeError:
         found = ", ".join(f"{name} {tuple(v.shape)}" for name, v in vectors.items())
-        raise ValueError(f"{_list(vectors)} must broadcast; found {found}.") from None
+        raise ValueError(f"{_listed(vectors)} must broadcast; found {found}.") from None
 
 
-def _list(vectors: dict[str, Tensor]) -> str:
+def _listed(vectors: dict[str, Tensor]) -> str:
     *names, last = vectors
     return f"{', '.join(names)} and {last}"
 

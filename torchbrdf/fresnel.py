@@ -19,7 +19,7 @@ from torchbrdf.parameters import (
 )
 
 # Relative index of a dielectric seen from either side; total internal reflection below 1.
-RELATIVE_INDEX = Interval(0.0, math.inf)
+RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1)
 
 
 def schlick(cos: Tensor, *, f0: Tensor) -> Tensor:

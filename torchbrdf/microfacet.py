@@ -1,7 +1,7 @@
 """Surfaces of mirror-like facets: the half vector, facet distributions, masking and shadowing.
 
-Everything is written in cosines. With a tangent the half vector comes from the components along it, which keeps all
-its digits; without one its inclination is a difference of cosines and known to about eps/alpha^2 (relative).
+The half vector comes from the vectors, or from components along the tangent, and keeps its digits. From dot products
+alone (`Cosines.from_products`) its inclination is a difference and known to about eps/alpha^2 (relative).
 """
 
 import math
@@ -12,7 +12,7 @@ import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
-from torchbrdf._numerics import angle_over_sine, safe_divide
+from torchbrdf._numerics import angle_over_sine, dot, safe_divide
 from torchbrdf.directions import Cosines
 
 # exp(-x^2/2) beyond is below 1e-17 of what lies before.
@@ -46,24 +46,26 @@ class HalfVector:
     @classmethod
     def of(cls, cosines: Cosines) -> "HalfVector":
         up = cosines.light + cosines.view
-        if cosines.light_tangent is None:
+        if cosines.tangent is not None:
+            plane = cosines.tangent_plane
+            along = plane.light_tangent + plane.view_tangent
+            across = plane.light_bitangent + plane.view_bitangent
+            flat = along * along + across * across
+            squared = flat + up * up
+            length = squared.sqrt()
+            return cls(up / length, flat / squared, length / 2, squared, along / length, across / length)
+        if cosines.vectors is not None:
+            normal, light, view = cosines.vectors
+            total = light + view
+            planar = total - dot(total, normal)[..., None] * normal
+            flat = dot(planar, planar).masked_fill(~cosines.above_horizon, 0.0)
+            squared = flat + up * up
+        else:
             # rounding can leave |l + v|^2 below the square of its own component along the normal
             squared = torch.maximum(2 * (1 + cosines.phase), up * up)
-            length = squared.sqrt()
-            return cls(up / length, (squared - up * up) / squared, length / 2, squared)
-        along, across = cls._planar(cosines)
-        flat = along * along + across * across
-        squared = flat + up * up
+            flat = squared - up * up
         length = squared.sqrt()
-        return cls(up / length, flat / squared, length / 2, squared, along / length, across / length)
-
-    @staticmethod
-    def _planar(cosines: Cosines) -> tuple[Tensor, Tensor]:
-        parts = (cosines.light_tangent, cosines.view_tangent, cosines.light_bitangent, cosines.view_bitangent)
-        if any(p is None for p in parts):
-            raise ValueError("the cosines carry only a part of the tangent components.")
-        lt, vt, lb, vb = parts
-        return lt + vt, lb + vb  # pyright: ignore[reportOperatorIssue, reportReturnType]
+        return cls(up / length, flat / squared, length / 2, squared)
 
     def tilt_squared(self) -> Tensor:
         """Squared angle between normal and half vector (...). [rad^2]"""

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, overload
+from typing import Any, ClassVar, overload
 
 import torch
 from torch import Tensor, nn
 
-from torchbrdf._numerics import SUPPORTED_DTYPES, holds
+from torchbrdf._numerics import SUPPORTED_DTYPES, holds, unit_tolerance
 
 
 @dataclass(frozen=True)
@@ -17,18 +17,23 @@ class Interval:
 
     `unit` is "rad", or "" for a pure number. `even` says that reflectance depends on the square of the
     parameter near low = 0, so that its derivative vanishes there: sigma is told from 0 through sigma^2.
+    `trailing` axes of the parameter are its own (channel, part); axes before them are pixels.
 
     The closed interval is what a formula accepts. A trained value lives in the open one, through a
-    logistic map (an exponential where high is infinite): it can approach a bound and never sit on it.
+    logistic map (an exponential where high is infinite): it approaches a bound until rounding sees no
+    difference, and its derivative fades on the way.
     """
 
     low: float
     high: float
     unit: str = ""
     even: bool = False
+    trailing: int = 0
 
     def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
         """Raise ValueError unless every entry lies in the domain (strictly inside if `open_ends`)."""
+        if not isinstance(value, Tensor):
+            raise TypeError(f"{name} must be a torch.Tensor; found {type(value).__name__}.")
         inside = (value > self.low) & (value < self.high) if open_ends else (value >= self.low) & (value <= self.high)
         if holds(inside):
             return
@@ -57,15 +62,52 @@ class Interval:
         return (self.low + inside).reshape(raw.shape)
 
 
-ALBEDO = Interval(0.0, 1.0)
+@dataclass(frozen=True)
+class Simplex:
+    """Domain of shares: entries >= 0 that sum to 1 along the last axis.
+
+    A trained value has all entries above 0. Its raw form (..., K - 1) is the logarithms of their ratios
+    to the last entry, read back by softmax.
+    """
+
+    low: ClassVar[float] = 0.0
+    high: ClassVar[float] = 1.0
+    unit: ClassVar[str] = ""
+    even: ClassVar[bool] = False
+    trailing: ClassVar[int] = 1
+
+    def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
+        """Raise ValueError unless the entries are shares (all above 0 if `open_ends`)."""
+        if value.ndim == 0:
+            raise ValueError(f"{name} must hold shares along its last axis; found a single number.")
+        total = value.sum(-1)
+        sums_to_one = (total - 1).abs() <= unit_tolerance(value.dtype)
+        inside = ((value > 0) if open_ends else (value >= 0)).all(-1) & sums_to_one
+        if not holds(inside):
+            remedy = " A trained share cannot be 0: hold it with fixed(...)." if open_ends else ""
+            raise ValueError(
+                f"{name} must hold shares {'above' if open_ends else 'of at least'} 0 that sum to 1; "
+                f"found min {value.min():.6g}, sums from {total.min():.9g} to {total.max():.9g}.{remedy}"
+            )
+
+    def to_raw(self, value: Tensor) -> Tensor:
+        """Unconstrained coordinate of a value inside the domain."""
+        return (value[..., :-1] / value[..., -1:]).log()
+
+    def from_raw(self, raw: Tensor) -> Tensor:
+        """Value inside the domain for any real numbers."""
+        return torch.cat((raw, torch.zeros_like(raw[..., :1])), -1).softmax(-1)
+
+
+ALBEDO = Interval(0.0, 1.0, trailing=1)
 ROUGHNESS = Interval(0.0, math.pi / 2, "rad", even=True)
-WEIGHT = Interval(0.0, math.inf)
+WEIGHT = Interval(0.0, math.inf, trailing=1)
 EXPONENT = Interval(0.0, math.inf)
 # Below this microfacet width the lobe is narrower than float32 cosines resolve: use Mirror.
 NARROWEST = 1e-3
 WIDTH = Interval(NARROWEST, 1.0)
-REFRACTIVE_INDEX = Interval(1.0, math.inf)
-ABSORPTION_INDEX = Interval(0.0, math.inf)
+REFRACTIVE_INDEX = Interval(1.0, math.inf, trailing=1)
+ABSORPTION_INDEX = Interval(0.0, math.inf, trailing=1)
 
 
 @dataclass(frozen=True)
@@ -82,7 +124,7 @@ class Constrained:
     `fixed(value)` stores the value as the buffer `fixed_<name>`. Reading gives the constrained value.
     """
 
-    def __init__(self, domain: Interval):
+    def __init__(self, domain: Interval | Simplex):
         self.domain = domain
 
     def __set_name__(self, owner: type, name: str) -> None:
@@ -101,8 +143,14 @@ class Constrained:
 
     def __set__(self, module: nn.Module, value: "Tensor | float | fixed") -> None:
         held = isinstance(value, fixed)
-        tensor = _as_float_tensor(value.value if held else value)
         name = f"{type(module).__name__}.{self.name}"
+        given = value.value if held else value
+        if isinstance(given, Tensor) and given.grad_fn is not None:
+            raise ValueError(
+                f"{name} is the result of a computation, and a module keeps a parameter of its own: its gradient would "
+                "be lost. Pass .detach(), or differentiate through the model's function or torch.func.functional_call."
+            )
+        tensor = _as_float_tensor(given)
         if tensor.dtype not in SUPPORTED_DTYPES:
             raise TypeError(f"{name} must be float32 or float64; found {tensor.dtype}.")
         self.domain.check(name, tensor, open_ends=not held)
@@ -148,7 +196,7 @@ def declared(module: nn.Module) -> Iterator[Constrained]:
         yield from (entry for entry in vars(owner).values() if isinstance(entry, Constrained))
 
 
-def trainable(module: nn.Module) -> dict[str, tuple[str, Interval]]:
+def trainable(module: nn.Module) -> dict[str, tuple[str, Interval | Simplex]]:
     """Trained parameters of a module and its children: readable path -> (path of the raw one, domain)."""
     found = {}
     for prefix, child in module.named_modules():
@@ -158,6 +206,15 @@ def trainable(module: nn.Module) -> dict[str, tuple[str, Interval]]:
             if raw is not None and raw.requires_grad:
                 found[dot + entry.name] = (f"{dot}raw_{entry.name}", entry.domain)
     return found
+
+
+def is_per_texel(module: nn.Module) -> bool:
+    """Whether any parameter has one entry for each pixel."""
+    return any(
+        getattr(child, entry.name).ndim > entry.domain.trailing
+        for child in module.modules()
+        for entry in declared(child)
+    )
 
 
 def sigma_from_degrees(degrees: Tensor | float) -> Tensor:

@@ -33,16 +33,14 @@ class Sample(NamedTuple):
 
 def local_light(cosines: Cosines) -> Tensor:
     """Light (..., 3) in the frame (tangent, bitangent, normal) of the cosines."""
-    if cosines.light_tangent is None or cosines.light_bitangent is None:
-        raise ValueError("this density needs a tangent: pass tangent=... to Cosines.of.")
-    return torch.stack((cosines.light_tangent, cosines.light_bitangent, cosines.light), -1)
+    plane = cosines.tangent_plane
+    return torch.stack((plane.light_tangent, plane.light_bitangent, cosines.light), -1)
 
 
 def local_view(cosines: Cosines) -> Tensor:
     """View (..., 3) in the frame (tangent, bitangent, normal) of the cosines."""
-    if cosines.view_tangent is None or cosines.view_bitangent is None:
-        raise ValueError("this density needs a tangent: pass tangent=... to Cosines.of.")
-    return torch.stack((cosines.view_tangent, cosines.view_bitangent, cosines.view), -1)
+    plane = cosines.tangent_plane
+    return torch.stack((plane.view_tangent, plane.view_bitangent, cosines.view), -1)
 
 
 def choose(u: Tensor, probability: Tensor) -> tuple[Tensor, Tensor]:

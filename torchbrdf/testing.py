@@ -156,12 +156,12 @@ def assert_energy(
     limit: float = 1.0,
     view_angles: Sequence[float] = (0.0, 0.5, 1.0, 1.3, 1.48, 1.55),
     nodes: int = 24,
+    tolerance: float = TOLERANCE[torch.float64].integral,
 ) -> None:
     """The directional albedo is at most `limit`, in float64, at each view angle [rad].
 
     Gauss-Legendre panels that end at the kinks of Oren-Nayar models; twice the nodes must agree, else it reports that.
     """
-    tolerance = TOLERANCE[torch.float64].integral
     exact = copy.deepcopy(brdf).double()
     for angle in view_angles:
         coarse, fine = (_directional_albedo(exact, angle, n) for n in (nodes, 2 * nodes))

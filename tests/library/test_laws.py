@@ -14,6 +14,8 @@ from torchbrdf import testing as laws
 
 TOLERANCE = laws.TOLERANCE
 HARD = list(laws.hard_directions())
+CAPTURED = [m for m in MODELS if m.captured]
+ISOTROPIC = [m for m in MODELS if m.isotropic]
 EXCEPTIONS = [m for m in MODELS if m.reason]
 # A mirror has parameters that no value of f_r shows.
 TRAINED = [m for m in MODELS if m.name != "mirror" and any(True for _ in m.make(torch.float32).parameters())]
@@ -44,7 +46,7 @@ def test_zero_below_horizon(model, dtype, directions):
 
 
 def test_energy(model):
-    laws.assert_energy(model.make(torch.float64), limit=model.energy_limit, nodes=model.nodes)
+    laws.assert_energy(model.make(torch.float64), limit=model.energy_limit, nodes=model.nodes, tolerance=model.integral)
 
 
 @pytest.mark.parametrize("model", EXCEPTIONS, ids=lambda m: m.name)
@@ -107,12 +109,12 @@ def test_broadcasts_like_a_loop(model, dtype):
 
 
 def test_float32_matches_float64(model):
-    # 1e-6 of the sum of the absolute terms. Over 1.2 million directions per sigma the largest error was 7.5e-7 at
-    # sigma = 0.5, 9.7e-7 at 1.0 and 1.6e-6 at 1.2 (beyond 1e-6 in 3 of a million): a dot product near 85 deg has
-    # lost a digit before the model sees it.
+    # 1e-6 of the sum of the absolute terms, unless the catalog says why not. Of OrenNayar, over 1.2 million directions
+    # per sigma, the largest error was 7.5e-7 at sigma = 0.5, 9.7e-7 at 1.0 and 1.6e-6 at 1.2 (beyond 1e-6 in 3 of a
+    # million): a dot product near 85 deg has lost a digit before the model sees it.
     generator = torch.Generator().manual_seed(2)
     laws.assert_float32_matches_float64(
-        model.make(torch.float32), *laws.random_directions(20_000, generator=generator), rtol=model.float32_error
+        model.make(torch.float32), *laws.random_directions(20_000, generator=generator), rtol=model.float32
     )
 
 
@@ -183,6 +185,7 @@ def test_functional_call_reads_the_given_parameters(model):
     assert torch.equal(functional_call(brdf, moved, directions), expected(*directions))
 
 
+@pytest.mark.parametrize("model", CAPTURED, ids=lambda m: m.name)
 @pytest.mark.parametrize("backend", ["eager", "aot_eager"])
 def test_captured_in_one_graph(model, backend):
     # The graph and its derivative, without code generation: what can break model by model.
@@ -192,7 +195,7 @@ def test_captured_in_one_graph(model, backend):
 
 
 def test_compiles(dtype):
-    assert_compiles(mixture(dtype), few(16, dtype), "inductor")  # many models at once: one is 15 s
+    assert_compiles(mixture(dtype), few(16, dtype), "inductor")  # every model at once: one is 15 s
 
 
 def test_others_compile():
@@ -300,6 +303,7 @@ def test_random_directions_stay_within_the_angle():
         assert math.cos(math.radians(85)) - 1e-12 < cosine.min() < math.cos(math.radians(80))
 
 
+@pytest.mark.parametrize("model", ISOTROPIC, ids=lambda m: m.name)
 def test_directional_albedo_agrees_with_another_quadrature(model):
     # 128 nodes without regard to kinks against panels that end at them.
     brdf = model.make(torch.float64)

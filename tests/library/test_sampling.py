@@ -30,8 +30,11 @@ from torchbrdf import (
 from torchbrdf import testing as laws
 
 ANGLES = [math.radians(60), math.radians(85)]
+# The cheapest configuration of a model stands for the others; the most expensive take minutes.
+SAMPLED = [m for m in MODELS if m.captured]
+PLAIN = [m for m in SAMPLED if m.isotropic]
 # One run in a thousand raises a false alarm: shared between the tests of all models and angles (Bonferroni).
-FALSE_ALARM = 1e-3 / (len(MODELS) * len(ANGLES))
+FALSE_ALARM = 1e-3 / (len(SAMPLED) * len(ANGLES))
 
 
 def seeded(seed=0):
@@ -42,6 +45,7 @@ def held(value):
     return fixed(torch.tensor(value, dtype=torch.float64))
 
 
+@pytest.mark.parametrize("model", SAMPLED, ids=lambda m: m.name)
 @pytest.mark.parametrize("angle", ANGLES)
 def test_samples_follow_pdf(model, angle):
     sampling_laws.assert_samples_follow_pdf(
@@ -49,16 +53,19 @@ def test_samples_follow_pdf(model, angle):
     )
 
 
+@pytest.mark.parametrize("model", SAMPLED, ids=lambda m: m.name)
 @pytest.mark.parametrize("angle", [0.0, math.radians(85)])
 def test_density_integrates(model, angle):
     sampling_laws.assert_density_integrates(model.make(torch.float64), angle, generator=seeded())
 
 
+@pytest.mark.parametrize("model", SAMPLED, ids=lambda m: m.name)
 @pytest.mark.parametrize("angle", [0.0, *ANGLES, math.radians(89.9)])
 def test_weight_is_f_cos_over_pdf(model, angle):
     sampling_laws.assert_weights(model.make(torch.float64), angle, generator=seeded())
 
 
+@pytest.mark.parametrize("model", PLAIN, ids=lambda m: m.name)
 def test_mean_weight_is_the_directional_albedo(model):
     # five standard errors: a false alarm in 1.7 million tests
     brdf = model.make(torch.float64)
@@ -68,11 +75,12 @@ def test_mean_weight_is_the_directional_albedo(model):
         weight = setting.draw(20_000, seeded()).weight
     if brdf.anisotropic:  # the quadrature takes the view along the grain: leave it to test_density_integrates
         return
-    expected = brdf.directional_albedo(torch.tensor(math.cos(angle), dtype=torch.float64), nodes=256).detach()
+    expected = brdf.directional_albedo(torch.tensor(math.cos(angle), dtype=torch.float64), nodes=192).detach()
     allowed = 5 * weight.std(0) / math.sqrt(len(weight)) + max(5e-5, model.albedo_error / 20)
     assert ((weight.mean(0) - expected).abs() <= allowed).all()
 
 
+@pytest.mark.parametrize("model", SAMPLED, ids=lambda m: m.name)
 def test_samples_in_float32(model):
     brdf = model.make(torch.float32)
     normal, _, view = laws.random_directions(500, generator=seeded(), max_angle=math.radians(89.9))

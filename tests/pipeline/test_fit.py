@@ -7,7 +7,14 @@ import torch
 from scipy.stats import binom
 
 from inverse import Ambient, Distant, FitError, Scene, Sensor, Surface, bootstrap, fit, plane, render, sphere, vase
-from torchbrdf import Lambert, OrenNayar, QualitativeOrenNayar, fixed, sigma_from_degrees, trainable
+from torchbrdf import (
+    Lambert,
+    OrenNayar,
+    QualitativeOrenNayar,
+    fixed,
+    sigma_from_degrees,
+    trainable,
+)
 
 DOUBLE = torch.float64
 LIGHTS = [Distant.from_angle(0), Distant.from_angle(20)]
@@ -257,7 +264,7 @@ def test_bad_masks_and_settings_are_named():
         fit(SCENE, GOOD, Lambert(), valid=nothing[:1])
     with pytest.raises(ValueError, match="nothing to fit"):
         fit(SCENE, GOOD, Lambert(albedo=fixed(0.5)))
-    with pytest.raises(ValueError, match="starts must be at least 1"):
+    with pytest.raises(ValueError, match="starts must be a whole number of at least 1"):
         fit(SCENE, GOOD, Lambert(), starts=0)
     with pytest.raises(ValueError, match="mask is empty"):
         Surface(GOOD[0].expand(16, 16, 3), GOOD[0].expand(16, 16, 3), nothing[0], torch.tensor([0.0, 0.0, 1.0]))
@@ -284,5 +291,7 @@ def test_bootstrap_sees_a_light_that_is_wrong():
     found = fit(believed, photographs, OrenNayar())
     spread = bootstrap(believed, photographs, OrenNayar(), samples=20)
     assert spread["sigma"] > 2 * found.standard_error["sigma"]
-    with pytest.raises(ValueError, match="at least 2"):
+    with pytest.raises(ValueError, match="at least 2 samples"):
         bootstrap(believed, photographs, OrenNayar(), samples=1)
+    with pytest.raises(ValueError, match="at least 3; found 2"):
+        bootstrap(Scene(surface, believed.lights[:2]), photographs[:2], OrenNayar(), samples=3)

@@ -107,12 +107,10 @@ class _Anisotropic(_Microfacet):
         self.masking = masking
 
     def slopes_squared(self, cosines: Cosines) -> tuple[Tensor, Tensor]:
-        c = cosines
-        if c.light_tangent is None or c.light_bitangent is None or c.view_tangent is None or c.view_bitangent is None:
-            raise ValueError(f"{type(self).__name__} needs a tangent: pass tangent=... to Cosines.of.")
+        c, plane = cosines, cosines.tangent_plane
         ax, ay = self._widths()
-        light = ((ax * c.light_tangent) ** 2 + (ay * c.light_bitangent) ** 2) / (c.light * c.light)
-        view = ((ax * c.view_tangent) ** 2 + (ay * c.view_bitangent) ** 2) / (c.view * c.view)
+        light = ((ax * plane.light_tangent) ** 2 + (ay * plane.light_bitangent) ** 2) / (c.light * c.light)
+        view = ((ax * plane.view_tangent) ** 2 + (ay * plane.view_bitangent) ** 2) / (c.view * c.view)
         return light, view
 
     def _widths(self) -> tuple[Tensor, Tensor]:
@@ -132,8 +130,7 @@ class GGX(_Isotropic):
         fresnel: reflectance of a facet; Schlick (0.04) if not given.
         masking: G_2: smith_correlated, smith_separable or v_cavities.
     Components: specular.
-    Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.69 of the light at normal incidence. In
-        float32 relative errors grow as 1e-7/alpha^2 unless a tangent is given.
+    Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.69 of the light at normal incidence.
     Source: Walter et al. 2007; Heitz 2014.
     """
 
@@ -177,8 +174,7 @@ class Beckmann(_Isotropic):
         fresnel: reflectance of a facet; Schlick (0.04) if not given.
         masking: G_2: smith_correlated, smith_separable or v_cavities.
     Components: specular.
-    Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.94 of the light at normal incidence. In
-        float32 relative errors grow as 1e-7/alpha^2 unless a tangent is given.
+    Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.94 of the light at normal incidence.
     Source: Beckmann & Spizzichino 1963; Cook & Torrance 1982; Heitz 2014.
     """
 

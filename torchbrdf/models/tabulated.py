@@ -6,7 +6,7 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import angle, safe_divide, safe_sqrt
+from torchbrdf._numerics import angle, dot, safe_divide, safe_sqrt
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.microfacet import HalfVector
@@ -22,7 +22,11 @@ def rusinkiewicz_angles(cosines: Cosines) -> tuple[Tensor, Tensor, Tensor]:
     """
     half = HalfVector.of(cosines)
     sin_h = safe_sqrt(half.sine_squared)
-    sin_d = safe_sqrt((1 - cosines.phase) / 2)
+    if cosines.vectors is None:
+        sin_d = safe_sqrt((1 - cosines.phase) / 2)
+    else:  # keeps its digits near the retro direction
+        apart = cosines.vectors[1] - cosines.vectors[2]
+        sin_d = safe_sqrt(dot(apart, apart).masked_fill(~cosines.above_horizon, 0.0)) / 2
     product = 2 * sin_h * sin_d
     defined = product > 0
     cos_phi = safe_divide((cosines.view - cosines.light).abs(), product, where=defined).clamp(max=1.0)

@@ -1,0 +1,75 @@
+"""The ladder: its reference is the converged model, its errors those of the sheet, its table says what was measured."""
+
+import json
+import math
+
+import pytest
+import torch
+
+from torchbrdf import Cosines, OrenNayar
+from torchbrdf.accuracy import RUNGS, Ladder, Row, ladder, reference, relative_errors
+from torchbrdf.models.oren_nayar.converged import converged
+from torchbrdf.models.oren_nayar.slope_plane import slope_plane
+from torchbrdf.testing import random_directions
+
+DOUBLE = torch.float64
+
+
+def directions(n, seed=0):
+    return Cosines.of(*random_directions(n, dtype=DOUBLE, generator=torch.Generator().manual_seed(seed)))
+
+
+@pytest.mark.parametrize("degrees", [5.0, 20.0, 60.0])
+def test_reference_is_the_converged_model(degrees):
+    cosines = directions(40)
+    sigma, rho = torch.deg2rad(torch.tensor(degrees, dtype=DOUBLE)), torch.tensor(0.9, dtype=DOUBLE)
+    found = reference(rho, sigma).evaluate(cosines)[:, 0]
+    parts = converged(slope_plane(cosines), sigma, albedo=rho)
+    expected = rho * parts.direct + rho**2 * parts.two_bounce + parts.higher
+    torch.testing.assert_close(found, expected, rtol=5e-4, atol=0)
+
+
+def test_errors_of_the_fitted_forms_are_those_of_the_sheet():
+    # rms over theta in 0..85 degrees at rho 0.7 against two bounces: 6.5 % functional, 15.8 % qualitative (sigma 20)
+    rungs = [rung for rung in RUNGS if rung.name in ("functional", "qualitative (0.33)", "exact, K = 48, 2 bounces")]
+    cosines = directions(1500, seed=1)
+    errors = relative_errors(rungs, [math.radians(20)], [0.7], cosines)
+    assert errors["functional"][1] == pytest.approx(0.065, abs=0.02)
+    assert errors["qualitative (0.33)"][1] == pytest.approx(0.158, abs=0.04)
+    # more bounces than two are small at this slope and albedo
+    assert errors["exact, K = 48, 2 bounces"][1] < 0.02
+
+
+def test_ladder_measures_every_rung():
+    rungs = [RUNGS[0], RUNGS[3]]
+    table = ladder(0.5, [0.3, 0.9], directions(200), rungs=rungs, repeats=1)
+    assert [row.name for row in table.rows] == ["Lambert", "functional"]
+    assert table.rows[0].forward == 1
+    assert table.rows[1].saved_bytes > table.rows[0].saved_bytes
+    assert table.rows[1].rms_error < table.rows[0].rms_error
+    assert json.loads(table.to_json())[1]["name"] == "functional"
+    assert table.to_markdown().count("\n") == 3
+
+
+def test_pareto_front_holds_what_nothing_beats():
+    rows = [
+        Row("cheap", 1, 0.3, 1, 1, 0),
+        Row("bad", 1, 0.3, 2, 1, 0),
+        Row("good", 1, 0.1, 5, 1, 0),
+        Row("worse", 1, 0.2, 6, 1, 0),
+    ]
+    assert [row.name for row in Ladder(tuple(rows)).pareto()] == ["cheap", "good"]
+
+
+def test_ladder_refuses_directions_below_the_horizon():
+    below = Cosines.from_products(*(torch.full((3,), k) for k in (-0.5, 0.5, 0.0)))
+    with pytest.raises(ValueError, match="above the horizon"):
+        ladder(0.3, 0.5, below)
+
+
+def test_saved_bytes_are_counted_once():
+    cosines = directions(1000)
+    (row,) = ladder(0.5, 0.5, cosines, rungs=[RUNGS[3]], repeats=1).rows
+    # a float64 tensor a point is 8 bytes; the functional model has about forty intermediate ones
+    assert 8 * 10 < row.saved_bytes < 8 * 120
+    assert isinstance(RUNGS[3].build(torch.tensor(0.5), torch.tensor(0.5)), OrenNayar)

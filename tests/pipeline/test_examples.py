@@ -1,0 +1,76 @@
+"""The examples run at reduced size and print what they promise."""
+
+import json
+import re
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    def run_example(name, *arguments):
+        monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
+        runpy.run_path(str(EXAMPLES / name), run_name="__main__")
+        return capsys.readouterr().out
+
+    return run_example
+
+
+def numbers(line):
+    return [float(k) for k in re.findall(r"[-+]?\d+\.\d+", line)]
+
+
+def test_first_steps(run):
+    printed = run("00_first_steps.py")
+    for name in ("Adam", "LBFGS"):
+        (line,) = (line for line in printed.splitlines() if line.startswith(name))
+        assert numbers(line)[0] == pytest.approx(40, abs=0.02)
+
+
+def test_vase_fit_recovers_the_clay_and_lambert_fails_as_the_paper_says(run, tmp_path):
+    printed = run("01_fit_vase.py", "--size", 96, "--output", tmp_path).splitlines()
+    exact = next(x for x in printed if x.startswith("exact, K = 16, all"))
+    sigma, sigma_error, albedo, albedo_error, *_ = numbers(exact)
+    assert abs(sigma - 40) < 4 * sigma_error
+    assert abs(albedo - 0.7) < 4 * albedo_error
+    assert sigma_error < 0.3
+    straight, oblique = (k for k, line in enumerate(printed) if line.startswith("  light"))
+    # the numbers of a line: (displacement,) -0.9, brightness there, +0.9, brightness there, rms
+    limb = {line.split()[0]: numbers(line) for line in printed[straight + 1 : straight + 3]}
+    assert limb["Lambert"][1] < 0.5
+    assert limb["exact"][1] > 0.7
+    displaced = {line.split()[0]: numbers(line)[0] for line in printed[oblique + 1 : oblique + 3]}
+    assert displaced["Lambert"] < -0.2
+    assert abs(displaced["exact"]) < 0.1
+    with Image.open(tmp_path / "vase_fit.png") as figure:
+        assert figure.size[0] > 1000
+
+
+def test_photographs_are_written_read_and_fitted(run, tmp_path):
+    printed = run("02_fit_photographs.py", "--synthetic", "--size", 48, "--refits", 3, "--output", tmp_path)
+    line = next(x for x in printed.splitlines() if x.startswith("sigma") and "deg" in x)
+    assert numbers(line)[0] == pytest.approx(15, abs=3)
+    assert (tmp_path / "photographs_fit.png").exists()
+
+
+def test_ladder_is_measured_and_drawn(run, tmp_path):
+    rungs = ("Lambert", "functional", "fast, all bounces", "exact, K = 16, 2 bounces")
+    printed = run("03_accuracy_vs_time.py", "--directions", 40, "--size", 12, "--output", tmp_path, "--rungs", *rungs)
+    rows = json.loads((tmp_path / "ladder_eager.json").read_text())["rows"]
+    assert [row["name"] for row in rows] == list(rungs)
+    assert rows[2]["rms_error"] < 0.1 * rows[1]["rms_error"]
+    assert rows[2]["sigma_bias"] < rows[1]["sigma_bias"]
+    assert "| Lambert |" in printed.replace("*", "")
+    assert (tmp_path / "ladder_eager.png").exists()
+
+
+def test_figures_of_the_paper(run, tmp_path):
+    printed = run("04_paper_figures.py", "--size", 16, "--points", 9, "--output", tmp_path).split()
+    assert len(printed) == 12
+    assert all(Path(name).exists() for name in printed)

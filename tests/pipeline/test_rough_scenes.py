@@ -1,0 +1,52 @@
+"""Pictures of rough objects flatten, as the paper's do, and their slopes can be read from photographs."""
+
+import pytest
+import torch
+
+from inverse import Distant, Scene, Sensor, cuboid, fit, render, sphere
+from torchbrdf import RoughSurface, TabulatedRoughSurface, fixed, sigma_from_degrees
+
+DOUBLE = torch.float64
+
+
+def rough(degrees):
+    return RoughSurface(albedo=fixed(0.9), sigma=fixed(sigma_from_degrees(degrees)))
+
+
+def test_spheres_flatten_with_roughness():
+    scene = Scene(sphere(64, 64), [Distant.from_angle(0)])
+    disc = scene.surface.mask & (scene.surface.normals[..., 2] > 0.25)
+    spread = []
+    for sigma in (0, 10, 20, 40):
+        image = render(scene, rough(sigma))[0, ..., 0]
+        spread.append((image[disc].std() / image[disc].mean()).item())
+    assert spread == sorted(spread, reverse=True)
+    assert spread[-1] < 0.1 < spread[0] / 2  # nearly a uniform disc: the full moon
+
+
+def test_contrast_between_the_faces_of_a_cube_shrinks():
+    for light in (Distant.from_angle(0), Distant.from_angle(20)):
+        scene = Scene(cuboid(48, 48, yaw=30), [light])
+        contrast = []
+        for sigma in (0, 30):
+            image = render(scene, rough(sigma))[0, ..., 0]
+            faces = [image[scene.surface.mask & (scene.surface.normals[..., 0] * side > 0)] for side in (1, -1)]
+            assert all(torch.allclose(face, face[:1], rtol=1e-5) for face in faces)  # flat faces are uniform
+            bright, dark = sorted((face.mean().item() for face in faces), reverse=True)
+            contrast.append((bright - dark) / (bright + dark))
+        assert contrast[1] < contrast[0]
+
+
+def test_slope_distribution_is_recovered_without_assuming_a_gaussian():
+    shares = torch.tensor([0.1, 0.3, 0.4, 0.15, 0.05], dtype=DOUBLE)
+    lights = [Distant.from_angle(a) for a in (-60, -30, 0, 30, 60)]
+    scene = Scene(sphere(32, 32, dtype=DOUBLE), lights, Sensor(exposure=2.0, read_noise=1e-4))
+    rho = fixed(torch.tensor(0.8, dtype=DOUBLE))
+    truth = TabulatedRoughSurface(albedo=rho, weights=fixed(shares))
+    photographs = scene.sensor.expose(render(scene, truth), torch.Generator().manual_seed(0))
+    start = TabulatedRoughSurface(albedo=rho, weights=torch.full((5,), 0.2, dtype=DOUBLE))
+    found = fit(scene, photographs, start, valid=photographs[..., 0] > 0.02)
+    z = (found.parameters["weights"] - shares) / found.standard_error["weights"]
+    assert found.parameters["weights"].sum().item() == pytest.approx(1)
+    assert z.abs().max() < 4
+    assert found.standard_error["weights"].max() < 0.05

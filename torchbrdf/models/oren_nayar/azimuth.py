@@ -1,0 +1,120 @@
+r"""Azimuth means over all facets of one slope angle: an isotropic surface made of equal cavities. Direct light, exact
+and closed.
+
+In the slope plane a = u.p = A cos(psi), b = u.q = B cos(psi - delta) with A = tan(theta_a) tan(theta_i), B =
+tan(theta_a) tan(theta_r). All that is not smooth happens on the lobes a > 1 (half width f_A = arcsec A) and b > 1 (f_B)
+and on their overlap [low, high].
+Source: own derivation in `equations/oren_nayar.md`, section 5a; the paper's closed forms, section 5b, are in
+    `azimuth_paper`.
+"""
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from torchbrdf._numerics import arccsc, arcsec
+from torchbrdf.models.oren_nayar.slope_plane import SlopePlane
+
+
+class Lobes(NamedTuple):
+    """Where facets of one slope angle saturate. Every field broadcasts the plane (...) with the slope."""
+
+    cos_slope: Tensor  # C = cos(theta_a) [-]
+    tan_slope: Tensor  # T = tan(theta_a) [-]
+    light: Tensor  # A [-]
+    view: Tensor  # B [-]
+    half_light: Tensor  # f_A [rad] in [0, pi/2)
+    half_view: Tensor  # f_B [rad] in [0, pi/2)
+    clear_light: (
+        Tensor  # pi/2 - f_A with all its digits: half width of the zone that is neither cut nor turned away [rad]
+    )
+    clear_view: Tensor  # pi/2 - f_B [rad]
+
+
+def saturated_lobes(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> Lobes:
+    """A, B and the critical angles f_A, f_B of eq. (39), 0 where nothing saturates. The slope broadcasts with the
+    plane.
+    """
+    light, view = tan_slope * plane.tan_light, tan_slope * plane.tan_view
+    return Lobes(cos_slope, tan_slope, light, view, arcsec(light), arcsec(view), arccsc(light), arccsc(view))
+
+
+def overlap(lobes: Lobes, angle: Tensor) -> tuple[Tensor, Tensor]:
+    """Azimuths low <= high at which both lobes hold, the view's lobe centred at `angle` in [0, pi]; equal where they
+    miss. [rad]
+    """
+    low = torch.maximum(-lobes.half_light, angle - lobes.half_view)
+    return low, torch.maximum(low, torch.minimum(lobes.half_light, angle + lobes.half_view))
+
+
+def saturated_correlation(plane: SlopePlane, lobes: Lobes) -> Tensor:
+    """Azimuth mean of c(a) c(b), c(z) = clamp(z, -1, 1): CC of section 5a (...). [-] in [-1, 1]
+
+    Section 5a adds terms of size A B that cancel on steep slopes at grazing angles. Here the part proportional to A B
+    cos(delta) is summed beforehand, and everything is written in the clear zones pi/2 - f, which are what remains
+    small.
+    """
+    across = math.pi - plane.delta
+    spread, total = (lobes.clear_light - lobes.clear_view).abs(), lobes.clear_light + lobes.clear_view
+    apart = (total - across).clamp(min=0) + (total - plane.delta).clamp(min=0)
+    nested = (spread - across).clamp(min=0) + (spread - plane.delta).clamp(min=0)
+    rims = 0.5 * ((2 * lobes.clear_light).sin() + (2 * lobes.clear_view).sin())
+    # A B cos(delta) = T^2 p.q is read from `dot`: smooth at normal incidence, where the azimuth itself means nothing.
+    clear = lobes.tan_slope * lobes.tan_slope * plane.dot * (0.5 * (apart - nested) + rims) / math.pi
+    return clear + _overlap_excess(plane.delta, lobes) - _overlap_excess(across, lobes)
+
+
+def common_excess(plane: SlopePlane, lobes: Lobes) -> Tensor:
+    """Azimuth mean of 2 (min(a, b) - 1)+: what the overlap of masking and shadowing gives back; m of section 5a (...).
+    [-]
+    """
+    low, high = overlap(lobes, plane.delta)
+    turn = torch.minimum(
+        torch.maximum(plane.crossing, low), high
+    )  # the shadow edge rules before it, the mask edge after
+    view_part = lobes.view * ((turn - plane.delta).sin() - (low - plane.delta).sin())
+    light_part = lobes.light * (high.sin() - turn.sin())
+    return (view_part + light_part - (high - low)) / math.pi
+
+
+def direct_mean(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> Tensor:
+    r"""Exact direct BRDF of isotropic cavities of one slope angle, unit albedo, any azimuth.
+
+    .. math:: d(\theta_a) = \frac1\pi \cos\theta_a\,\bigl[1 + \overline{c(a)c(b)} + 2\,\overline{(\min(a,b)-1)_+}\bigr]
+
+    Args: the plane (...) and cos, tan of the slope angle, broadcastable with it. [-]
+    Returns: (...). [1/sr] Not masked at the horizon.
+    Source: section 5a (own derivation; the paper gives only delta = 0, pi/2, pi and an interpolation).
+    """
+    lobes = saturated_lobes(plane, cos_slope=cos_slope, tan_slope=tan_slope)
+    return direct_from(common_excess(plane, lobes), saturated_correlation(plane, lobes), cos_slope)
+
+
+def direct_from(excess: Tensor, correlation: Tensor, cos_slope: Tensor) -> Tensor:
+    """(1/pi) C (1 + CC + m): the direct mean from its two parts (...). [1/sr]"""
+    return cos_slope * (1 + correlation + excess) / math.pi
+
+
+def two_bounce_mean_approximate(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> Tensor:
+    """Exact azimuth mean of the approximate exchange (48): (1/pi) C (1 - C)(1 - CC) (...). [1/sr] Source: section
+    5a.
+    """
+    lobes = saturated_lobes(plane, cos_slope=cos_slope, tan_slope=tan_slope)
+    return cos_slope * (1 - cos_slope) * (1 - saturated_correlation(plane, lobes)) / math.pi
+
+
+def _overlap_excess(angle: Tensor, lobes: Lobes) -> Tensor:
+    """(1/pi) times the integral of (a - 1)(b - 1), less that of (1/2) A B cos(angle), over the overlap of lobes `angle`
+    apart.
+    """
+    a, b = lobes.light, lobes.view
+    wider = 2 * torch.maximum(lobes.clear_light, lobes.clear_view)
+    gap = torch.maximum(wider, lobes.clear_light + lobes.clear_view + angle)  # pi - width of the overlap
+    half_gap = 0.5 * gap.clamp(max=math.pi)
+    middle = torch.minimum((0.5 * (lobes.clear_view - lobes.clear_light + angle)).clamp(min=0), angle)
+    half_chord = half_gap.cos()
+    product = a * b * (2 * middle - angle).cos() * half_gap.sin() * half_chord
+    singles = 2 * half_chord * (a * middle.cos() + b * (middle - angle).cos())
+    return torch.where(gap < math.pi, product - singles + math.pi - 2 * half_gap, 0.0) / math.pi
