@@ -53,7 +53,7 @@ def merl(values):
 
 def test_merl(tmp_path):
     scale = np.array([1, 1.15, 1.66]) / 1500
-    h, d, p = np.meshgrid(np.arange(8) / 8, np.arange(6) / 6, np.arange(12) / 12, indexing="ij")
+    h, d, _p = np.meshgrid(np.arange(8) / 8, np.arange(6) / 6, np.arange(12) / 12, indexing="ij")
     # linear in the angles where the nodes are: theta_h = h^2 pi/2, theta_d = d pi/2
     values = np.stack([np.full_like(h, 0.3), 0.1 + h**2, 0.2 + d]) / scale[:, None, None, None]
     brdf = read_merl(write(tmp_path, merl(values)))
