@@ -8,6 +8,7 @@ from inverse.bootstrap import bootstrap
 from inverse.fit import FitError, fit
 from inverse.geometry import Surface, cylinder, from_depth, from_normals, plane, revolution, sphere, vase
 from inverse.lights import Ambient, Distant
+from inverse.measured import Measurements, read_gonioreflectometer, read_merl, read_optical_constants
 from inverse.photos import Photographs, read_image, read_stack, usable, write_image, write_stack
 from inverse.profile import belly_row, cross_section, peak_position
 from inverse.result import FitResult
@@ -21,6 +22,7 @@ __all__ = [
     "Distant",
     "FitError",
     "FitResult",
+    "Measurements",
     "Photographs",
     "Scene",
     "Sensor",
@@ -35,7 +37,10 @@ __all__ = [
     "from_normals",
     "peak_position",
     "plane",
+    "read_gonioreflectometer",
     "read_image",
+    "read_merl",
+    "read_optical_constants",
     "read_stack",
     "render",
     "revolution",

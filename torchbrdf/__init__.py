@@ -10,15 +10,113 @@ Conventions, stated once:
 - Below the horizon f_r is 0 with zero gradient.
 """
 
-from torchbrdf.brdf import BRDF, ImageBRDF, LinearBRDF, WeightedSum
-from torchbrdf.directions import Cosines
-from torchbrdf.models.lambert import Lambert
-from torchbrdf.models.oren_nayar.anisotropic import AnisotropicRoughSurface
-from torchbrdf.models.oren_nayar.fast import FastRoughSurface, fast_rough_surface
-from torchbrdf.models.oren_nayar.functional import OrenNayar, oren_nayar
-from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar, qualitative
-from torchbrdf.models.oren_nayar.rough_surface import ClosedFormRoughSurface, RoughSurface, TabulatedRoughSurface
-from torchbrdf.models.oren_nayar.single_slope import ClosedFormVCavities, SingleSlopeVCavities, UnidirectionalVCavities
+from torchbrdf.brdf import (
+    BRDF,
+    ImageBRDF,
+    LinearBRDF,
+    WeightedSum,
+)
+from torchbrdf.directions import (
+    Cosines,
+)
+from torchbrdf.fresnel import (
+    Conductor,
+    Dielectric,
+    Fresnel,
+    Perfect,
+    Schlick,
+    conductor,
+    dielectric,
+    dielectric_average,
+    f0_from_index,
+    schlick,
+)
+from torchbrdf.microfacet import (
+    HalfVector,
+    smith_correlated,
+    smith_separable,
+    v_cavities,
+    v_cavity_masking,
+)
+from torchbrdf.models.ashikhmin_shirley import (
+    AshikhminShirley,
+)
+from torchbrdf.models.burley import (
+    Burley,
+    burley,
+)
+from torchbrdf.models.lambert import (
+    Lambert,
+)
+from torchbrdf.models.layered import (
+    Coupled,
+    Dampened,
+    Mirror,
+)
+from torchbrdf.models.microfacet import (
+    GGX,
+    AnisotropicBeckmann,
+    AnisotropicGGX,
+    Beckmann,
+)
+from torchbrdf.models.minnaert import (
+    Minnaert,
+    minnaert,
+)
+from torchbrdf.models.oren_nayar.anisotropic import (
+    AnisotropicRoughSurface,
+)
+from torchbrdf.models.oren_nayar.fast import (
+    FastRoughSurface,
+    fast_rough_surface,
+)
+from torchbrdf.models.oren_nayar.functional import (
+    OrenNayar,
+    oren_nayar,
+)
+from torchbrdf.models.oren_nayar.qualitative import (
+    QualitativeOrenNayar,
+    qualitative,
+)
+from torchbrdf.models.oren_nayar.rough_surface import (
+    ClosedFormRoughSurface,
+    RoughSurface,
+    TabulatedRoughSurface,
+)
+from torchbrdf.models.oren_nayar.single_slope import (
+    ClosedFormVCavities,
+    SingleSlopeVCavities,
+    UnidirectionalVCavities,
+)
+from torchbrdf.models.oriented import (
+    Oriented,
+)
+from torchbrdf.models.phong import (
+    MaxCosinePhong,
+    ModifiedPhong,
+    Phong,
+    phong_radiance,
+)
+from torchbrdf.models.planetary import (
+    Hapke,
+    LambertSphere,
+    LommelSeeliger,
+    lambert_sphere_fast,
+)
+from torchbrdf.models.rough_diffuse import (
+    EON,
+    FujiiOrenNayar,
+    eon_albedo_from_directional,
+    eon_albedo_from_white_sky,
+)
+from torchbrdf.models.tabulated import (
+    TabulatedBRDF,
+    rusinkiewicz_angles,
+)
+from torchbrdf.models.torrance_sparrow import (
+    TorranceSparrow,
+    torrance_sparrow,
+)
 from torchbrdf.parameters import (
     Constrained,
     Interval,
@@ -30,39 +128,92 @@ from torchbrdf.parameters import (
     sigma_from_mean_slope,
     trainable,
 )
-from torchbrdf.slopes import gaussian_weights, sample_slope, shared_slopes, tabulated_weights
+from torchbrdf.sampling import (
+    Sample,
+)
+from torchbrdf.slopes import (
+    gaussian_weights,
+    sample_slope,
+    shared_slopes,
+    tabulated_weights,
+)
 
 __all__ = [  # noqa: RUF022 - in plain order
+    "AnisotropicBeckmann",
+    "AnisotropicGGX",
     "AnisotropicRoughSurface",
+    "AshikhminShirley",
     "BRDF",
+    "Beckmann",
+    "Burley",
     "ClosedFormRoughSurface",
     "ClosedFormVCavities",
+    "Conductor",
     "Constrained",
     "Cosines",
+    "Coupled",
+    "Dampened",
+    "Dielectric",
+    "EON",
     "FastRoughSurface",
+    "Fresnel",
+    "FujiiOrenNayar",
+    "GGX",
+    "HalfVector",
+    "Hapke",
     "ImageBRDF",
     "Interval",
     "Lambert",
+    "LambertSphere",
     "LinearBRDF",
+    "LommelSeeliger",
+    "MaxCosinePhong",
+    "Minnaert",
+    "Mirror",
+    "ModifiedPhong",
     "OrenNayar",
+    "Oriented",
+    "Perfect",
+    "Phong",
     "QualitativeOrenNayar",
     "RoughSurface",
+    "Sample",
+    "Schlick",
     "Simplex",
     "SingleSlopeVCavities",
+    "TabulatedBRDF",
     "TabulatedRoughSurface",
+    "TorranceSparrow",
     "UnidirectionalVCavities",
     "WeightedSum",
+    "burley",
+    "conductor",
+    "dielectric",
+    "dielectric_average",
+    "eon_albedo_from_directional",
+    "eon_albedo_from_white_sky",
+    "f0_from_index",
     "fast_rough_surface",
     "fixed",
     "gaussian_weights",
     "is_per_texel",
+    "lambert_sphere_fast",
+    "minnaert",
     "oren_nayar",
+    "phong_radiance",
     "qualitative",
+    "rusinkiewicz_angles",
     "sample_slope",
+    "schlick",
     "shared_slopes",
     "sigma_from_beckmann_alpha",
     "sigma_from_degrees",
     "sigma_from_mean_slope",
+    "smith_correlated",
+    "smith_separable",
     "tabulated_weights",
+    "torrance_sparrow",
     "trainable",
+    "v_cavities",
+    "v_cavity_masking",
 ]

@@ -28,7 +28,26 @@ def _angle_over_sine_polynomial(degree: int) -> tuple[float, ...]:
     return tuple(float(k) for k in in_powers.coef[::-1])
 
 
+def _sine_excess_polynomial(degree: int) -> tuple[float, ...]:
+    """Coefficients, highest power first, of (1 - c acos(c)/sqrt(1 - c^2))/(1 - c^2) in x = 2c - 1."""
+
+    def excess(x):
+        c = (1 + x) / 2
+        sine_squared = (1 - c) * (1 + c)
+        angle = 2 * np.arctan2(np.sqrt(1 - c), np.sqrt(1 + c))
+        closed = (1 - c * angle / np.sqrt(sine_squared)) / sine_squared
+        # hypergeometric series sum_k (2k)!!/(2k + 1)!! sin^2k of angle/(sin cos), times what is left of c
+        series, term = np.zeros_like(c), np.ones_like(c) / 3
+        for k in range(1, 60):
+            series, term = series + term, term * sine_squared * (2 * k) / (2 * k + 3)
+        return np.where(sine_squared < 0.3, series, closed)
+
+    in_powers = Chebyshev.interpolate(excess, degree).convert(kind=Polynomial)
+    return tuple(float(k) for k in in_powers.coef[::-1])
+
+
 _ANGLE_OVER_SINE = {dtype: _angle_over_sine_polynomial(n) for dtype, n in _ANGLE_DEGREE.items()}
+_SINE_EXCESS = {dtype: _sine_excess_polynomial(n) for dtype, n in _ANGLE_DEGREE.items()}
 SUPPORTED_DTYPES = tuple(_ANGLE_DEGREE)
 
 
@@ -106,12 +125,46 @@ def angle_over_sine(cosine: Tensor) -> Tensor:
 
     Relative error below 5e-15 in float64 and 2e-7 in float32.
     """
-    x = 2 * cosine - 1
-    highest, *rest = _ANGLE_OVER_SINE[cosine.dtype]
+    return _polynomial(_ANGLE_OVER_SINE[cosine.dtype], 2 * cosine - 1)
+
+
+def sine_excess(cosine: Tensor) -> Tensor:
+    """(sin(theta) - theta cos(theta))/sin^3(theta) for cos(theta) in [0, 1]: 1/3 at theta = 0, smooth there."""
+    return _polynomial(_SINE_EXCESS[cosine.dtype], 2 * cosine - 1)
+
+
+def _polynomial(coefficients: tuple[float, ...], x: Tensor) -> Tensor:
+    highest, *rest = coefficients
     total = torch.full_like(x, highest)
     for coefficient in rest:
         total = total * x + coefficient
     return total
+
+
+def angle(sine: Tensor, cosine: Tensor) -> Tensor:
+    """Angle in [0, pi] from its sine >= 0 and cosine; zero gradient where the sine is 0."""
+    flat = sine <= 0
+    inside = torch.atan2(sine.masked_fill(flat, 1.0), cosine.masked_fill(flat, 0.0))
+    ends = torch.where(cosine < 0, torch.full_like(cosine, np.pi), torch.zeros_like(cosine))
+    return torch.where(flat, ends.detach(), inside)
+
+
+def safe_power(base: Tensor, exponent: Tensor) -> Tensor:
+    """base^exponent for base > 0; else 0 with zero gradient, and 1 where the exponent is 0."""
+    empty = base <= 0
+    value = base.masked_fill(empty, 1.0) ** exponent
+    return torch.where(empty, (exponent == 0).to(value), value)
+
+
+def log_cosine_over_sine_squared(cosine: Tensor, sine_squared: Tensor) -> Tensor:
+    """log(cos)/sin^2 for cos > 0: -1/2 at 0, without loss of digits there."""
+    steep = sine_squared < 0.5
+    small = torch.where(steep, sine_squared, torch.full_like(sine_squared, 0.5))
+    flat = small <= 0
+    near = 0.5 * torch.log1p(-small) / small.masked_fill(flat, 1.0)
+    near = torch.where(flat, -0.5 - 0.25 * sine_squared, near)
+    far = torch.where(steep, torch.full_like(cosine, 0.5), cosine).log() / sine_squared.masked_fill(steep, 1.0)
+    return torch.where(steep, near, far)
 
 
 def holds(condition: Tensor) -> bool:

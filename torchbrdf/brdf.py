@@ -3,7 +3,6 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import torch
 from numpy.polynomial.legendre import leggauss
@@ -11,15 +10,17 @@ from torch import Tensor, nn
 
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
-from torchbrdf.parameters import WEIGHT, Constrained, declared
+from torchbrdf.parameters import WEIGHT, Constrained, Parametric
+from torchbrdf.sampled import Sampled, propose_from_parts
 
 PIXELS_AT_A_TIME = 4096
 
 
-class BRDF(nn.Module, ABC):
+class BRDF(Sampled, Parametric, ABC):
     """Bidirectional reflectance distribution function f_r [1/sr], cosine not included.
 
-    Subclasses implement `evaluate_components`. Sums and multiples are BRDFs again:
+    Subclasses implement `evaluate_components`, and `propose` with `density` where the sampling of `Sampled` is not
+    good enough. Sums and multiples are BRDFs again:
     `0.7 * OrenNayar() + 0.3 * Lambert()` has two trainable weights.
     """
 
@@ -32,13 +33,21 @@ class BRDF(nn.Module, ABC):
         `Cosines.of` raises; `normalize=True` scales the vectors to unit length first. Anisotropic
         models need a tangent (..., 3); the others ignore it.
         """
-        return self.evaluate(Cosines.of(normal, light, view, tangent=tangent, normalize=normalize))
+        return self.evaluate(self.cosines(normal, light, view, tangent=tangent, normalize=normalize))
+
+    def cosines(
+        self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
+    ) -> Cosines:
+        """What the model reads of the directions; raises ValueError where it misses a tangent."""
+        if self.anisotropic and tangent is None:
+            raise ValueError(self.missing_tangent())
+        return Cosines.of(normal, light, view, tangent=tangent, normalize=normalize)
 
     def components(
         self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
     ) -> dict[str, Tensor]:
         """The named parts (..., channel) [1/sr] whose sum is `forward`."""
-        cosines = Cosines.of(normal, light, view, tangent=tangent, normalize=normalize)
+        cosines = self.cosines(normal, light, view, tangent=tangent, normalize=normalize)
         parts = self.evaluate_components(cosines)
         return {name: cosines.zero_below_horizon(part) for name, part in parts.items()}
 
@@ -50,16 +59,13 @@ class BRDF(nn.Module, ABC):
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         """The named parts, each (..., channel); values below the horizon are arbitrary but finite."""
 
-    def material(self) -> dict[str, Tensor]:
-        """The constrained parameters by name."""
-        return {entry.name: getattr(self, entry.name) for entry in declared(self)}
-
     def directional_albedo(self, cos_view: Tensor, *, nodes: int = 32) -> Tensor:
         """Share of light from direction `cos_view` (...) that is reflected in all directions (..., channel).
 
         Quadrature over the hemisphere: `nodes` Gauss-Legendre cosines times as many azimuths. [-]
         By reciprocity also the radiance under uniform ambient light of radiance 1. At 32 nodes the
-        Oren-Nayar models are good to 3e-4 up to 85 degrees.
+        Oren-Nayar models are good to 3e-4 up to 85 degrees; narrow lobes need more nodes than they have
+        widths in the hemisphere. Anisotropic models: for a view in the plane of normal and tangent.
         """
         x, w = leggauss(nodes)
         # the nodes come first, so that per-texel parameters line up with cos_view
@@ -69,17 +75,20 @@ class BRDF(nn.Module, ABC):
         w_light, w_dphi = (cos_view.new_tensor(w).reshape(shape) for shape in (cos_light.shape, dphi.shape))
         # d(cos_light) d(dphi) over half the circle of azimuths, which the other half mirrors
         weight = cos_light * (w_light / 2) * (w_dphi / 2 * math.pi) * 2
-        sines = safe_sqrt((1 - cos_view) * (1 + cos_view)) * safe_sqrt((1 - cos_light) * (1 + cos_light))
-        cosines = Cosines.from_products(cos_light, cos_view, cos_light * cos_view + sines * dphi.cos())
-        return (self.evaluate(cosines) * weight[..., None]).sum((0, 1))
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        # nn.Module would register an nn.Parameter under the name before the table sees it.
-        entry = getattr(type(self), name, None)
-        if isinstance(entry, Constrained):
-            entry.__set__(self, value)
+        sin_view, sin_light = (safe_sqrt((1 - c) * (1 + c)) for c in (cos_view, cos_light))
+        if self.anisotropic:  # the view lies in the plane of normal and tangent
+            weight = torch.cat((weight, weight), 1) / 2
+            turn = torch.cat((dphi, -dphi), 1)
+            light = (sin_light * turn.cos(), sin_light * turn.sin(), cos_light)
+            vectors = [
+                torch.stack(torch.broadcast_tensors(*v), -1) for v in (light, (sin_view, 0 * sin_view, cos_view))
+            ]
+            x, _, z = torch.eye(3, dtype=cos_view.dtype, device=cos_view.device)
+            cosines = Cosines.of(z, *vectors, tangent=x, normalize=True)
         else:
-            super().__setattr__(name, value)
+            phase = cos_light * cos_view + sin_view * sin_light * dphi.cos()
+            cosines = Cosines.from_products(cos_light, cos_view, phase)
+        return (self.evaluate(cosines) * weight[..., None]).sum((0, 1))
 
     def __mul__(self, weight: Tensor | float) -> "WeightedSum":
         return WeightedSum([self], [weight])
@@ -200,6 +209,37 @@ class WeightedSum(BRDF):
                 label = f"{type(part).__name__}.{name}"
                 found[f"{label}#{position}" if label in found else label] = weight * value
         return found
+
+    @property
+    def anisotropic(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return any(part.anisotropic for part in self._brdfs())
+
+    def directional_albedo(self, cos_view: Tensor, *, nodes: int = 32) -> Tensor:
+        return _sum(
+            [w * p.directional_albedo(cos_view, nodes=nodes) for p, w in zip(self._brdfs(), self.weights, strict=True)]
+        )
+
+    def propose(self, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:
+        return propose_from_parts(self._brdfs(), self._shares(), view, u)
+
+    def density(self, cosines: Cosines) -> Tensor:
+        return _sum([p * part.density(cosines) for part, p in zip(self._brdfs(), self._shares(), strict=True)])
+
+    def delta_reflectance(self, cosines: Cosines) -> Tensor | None:
+        found = [(w, part.delta_reflectance(cosines)) for part, w in zip(self._brdfs(), self.weights, strict=True)]
+        mirrors = [w * r for w, r in found if r is not None]
+        return _sum(mirrors) if mirrors else None
+
+    def delta_probability(self, cosines: Cosines) -> Tensor:
+        return _sum(
+            [p * part.delta_probability(cosines) for part, p in zip(self._brdfs(), self._shares(), strict=True)]
+        )
+
+    def _brdfs(self) -> list[BRDF]:
+        return list(self.parts)  # pyright: ignore[reportReturnType]
+
+    def _shares(self) -> Tensor:
+        return (self.weights / self.weights.sum()).detach()
 
     def __mul__(self, weight: Tensor | float) -> "WeightedSum":
         return WeightedSum(list(self.parts), self.weights.detach() * weight)  # pyright: ignore[reportArgumentType]

@@ -132,19 +132,11 @@ class Cosines:
         if self.vectors is None or self.tangent is None:
             raise ValueError(
                 "an anisotropic model needs a tangent: pass tangent=(..., 3), a direction along the surface, "
-                "to the model or to Cosines.of. Its directional albedo depends on the azimuth and is not defined."
+                "to the model or to Cosines.of."
             )
         normal, *directions = self.vectors
-        bitangent = cross(normal, _normalized("tangent", self.tangent))
-        squared = dot(bitangent, bitangent)
-        parallel = squared <= unit_tolerance(squared.dtype) ** 2
-        if not holds(~parallel):
-            raise ValueError(
-                f"tangent must not be parallel to the normal; {int(parallel.sum())} of {parallel.numel()} are. "
-                "Choose a direction along the surface."
-            )
-        bitangent = bitangent / squared.sqrt()[..., None]
-        tangent = cross(bitangent, normal)
+        tangent = orthonormal_tangent(normal, self.tangent)
+        bitangent = cross(normal, tangent)
         below = ~self.above_horizon
         parts = [dot(along, direction) for direction in directions for along in (tangent, bitangent)]
         return TangentPlane(*(part.masked_fill(below, 0.0) for part in parts))
@@ -194,6 +186,33 @@ class Cosines:
     def beta_over_sine(self) -> Tensor:
         """beta/sin(beta) (...), by a polynomial in the cosine."""
         return angle_over_sine(self.beta)
+
+
+def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
+    """Unit vector (..., 3) along the part of `tangent` that is perpendicular to the unit normal.
+
+    Raises: ValueError where the tangent is (within rounding) parallel to the normal, 0 or not finite.
+    """
+    bitangent = cross(normal, _normalized("tangent", tangent))
+    squared = dot(bitangent, bitangent)
+    parallel = squared <= unit_tolerance(squared.dtype) ** 2
+    if not holds(~parallel):
+        raise ValueError(
+            f"tangent must not be parallel to the normal; {int(parallel.sum())} of {parallel.numel()} are. "
+            "Choose a direction along the surface."
+        )
+    return cross(bitangent / squared.sqrt()[..., None], normal)
+
+
+def any_tangent(normal: Tensor) -> Tensor:
+    """A unit vector (..., 3) perpendicular to the unit normal, smooth except where normal_z changes sign.
+
+    Source: Duff et al. 2017, Building an Orthonormal Basis, Revisited.
+    """
+    x, y, z = normal.unbind(-1)
+    sign = torch.where(z < 0, -torch.ones_like(z), torch.ones_like(z))
+    a = -1 / (sign + z)
+    return torch.stack((1 + sign * x * x * a, sign * x * y * a, -sign * x), -1)
 
 
 def _check_shapes(vectors: dict[str, Tensor]) -> None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, overload
+from typing import Any, ClassVar, overload
 
 import torch
 from torch import Tensor, nn
@@ -102,6 +102,12 @@ class Simplex:
 ALBEDO = Interval(0.0, 1.0, trailing=1)
 ROUGHNESS = Interval(0.0, math.pi / 2, "rad", even=True)
 WEIGHT = Interval(0.0, math.inf, trailing=1)
+EXPONENT = Interval(0.0, math.inf)
+# Below this microfacet width the lobe is narrower than float32 cosines resolve: use Mirror.
+NARROWEST = 1e-3
+WIDTH = Interval(NARROWEST, 1.0)
+REFRACTIVE_INDEX = Interval(1.0, math.inf, trailing=1)
+ABSORPTION_INDEX = Interval(0.0, math.inf, trailing=1)
 
 
 @dataclass(frozen=True)
@@ -161,6 +167,22 @@ class Constrained:
                 present.copy_(raw)
         else:
             module.register_parameter(raw_name, nn.Parameter(raw))
+
+
+class Parametric(nn.Module):
+    """A module whose class body declares constrained parameters."""
+
+    def material(self) -> dict[str, Tensor]:
+        """The constrained parameters by name."""
+        return {entry.name: getattr(self, entry.name) for entry in declared(self)}
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        # nn.Module would register an nn.Parameter under the name before the table sees it.
+        entry = getattr(type(self), name, None)
+        if isinstance(entry, Constrained):
+            entry.__set__(self, value)
+        else:
+            super().__setattr__(name, value)
 
 
 def _as_float_tensor(value: Tensor | float) -> Tensor:

@@ -40,6 +40,7 @@ class AnisotropicRoughSurface(ImageBRDF):
     Source: Oren & Nayar 1994 (long version), eqs. (8), (22); two widths: own.
     """
 
+    anisotropic = True
     albedo: Constrained = Constrained(ALBEDO)
     sigma_x: Constrained = Constrained(SPREAD)
     sigma_y: Constrained = Constrained(SPREAD)

@@ -9,6 +9,7 @@ from torch import Tensor
 from torchbrdf.brdf import LinearBRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
 def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
@@ -82,7 +83,7 @@ def interreflection_coefficients(albedo: Tensor, sigma: Tensor) -> Tensor:
 
 
 @final
-class OrenNayar(LinearBRDF):
+class OrenNayar(CltcSampled, LinearBRDF):
     """Functional approximation as a module; see `oren_nayar` for equation, units and deviations.
 
     Args:
@@ -111,6 +112,9 @@ class OrenNayar(LinearBRDF):
         self.albedo = albedo
         self.sigma = sigma
         self._parts = {"direct": direct, "interreflection": interreflection}
+
+    def sampling_roughness(self) -> Tensor:
+        return equivalent_roughness(self.sigma)
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return geometry_terms(cosines)

@@ -9,6 +9,7 @@ from torch import Tensor
 from torchbrdf.brdf import LinearBRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
 def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: float = 0.33) -> Tensor:
@@ -53,7 +54,7 @@ def qualitative_coefficients(albedo: Tensor, sigma: Tensor, a_constant: float) -
 
 
 @final
-class QualitativeOrenNayar(LinearBRDF):
+class QualitativeOrenNayar(CltcSampled, LinearBRDF):
     """Qualitative model as a module; see `qualitative` for equation, units and deviations.
 
     Args:
@@ -80,6 +81,9 @@ class QualitativeOrenNayar(LinearBRDF):
         self.albedo = albedo
         self.sigma = sigma
         self.a_constant = a_constant
+
+    def sampling_roughness(self) -> Tensor:
+        return equivalent_roughness(self.sigma)
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return geometry_terms(cosines)

@@ -142,6 +142,7 @@ class UnidirectionalVCavities(BRDF):
     Source: Oren & Nayar 1994 (long version), section 4.1, eqs. (19), (22), (38) repaired.
     """
 
+    anisotropic = True
     albedo: Constrained = Constrained(ALBEDO)
     slope: Constrained = Constrained(SLOPE)
 

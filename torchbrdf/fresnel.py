@@ -1,0 +1,213 @@
+"""Reflectance of a smooth interface, as functions of the cosine of incidence and as modules models are built with."""
+
+import math
+from abc import ABC, abstractmethod
+from typing import final
+
+import torch
+from torch import Tensor
+
+from torchbrdf._numerics import safe_divide, safe_sqrt
+from torchbrdf.parameters import (
+    ABSORPTION_INDEX,
+    ALBEDO,
+    REFRACTIVE_INDEX,
+    Constrained,
+    Interval,
+    Parametric,
+    fixed,
+)
+
+# Relative index of a dielectric seen from either side; total internal reflection below 1.
+RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1)
+
+
+def schlick(cos: Tensor, *, f0: Tensor) -> Tensor:
+    r"""Reflectance of a smooth interface, fitted.
+
+    .. math:: F = F_0 + (1 - F_0) (1 - c)^5
+
+    Args:
+        cos: cosine c of incidence, broadcasts with f0. [-] in [0, 1]
+        f0: reflectance at normal incidence. [-] in [0, 1]
+    Returns: F, shapes broadcast. [-]
+    Deviations: a fit. Up to 0.05 from `dielectric` at eta = 1.5 (near 80 degrees), more for metals.
+    Source: Schlick 1994.
+    """
+    return f0 + (1 - f0) * fifth_power(1 - cos)
+
+
+def fifth_power(x: Tensor) -> Tensor:
+    """max(0, x)^5; rounding can leave 1 - cos below 0."""
+    x = x.relu()
+    squared = x * x
+    return squared * squared * x
+
+
+def f0_from_index(eta: Tensor) -> Tensor:
+    """Reflectance at normal incidence from the relative index: ((eta - 1)/(eta + 1))^2."""
+    return ((eta - 1) / (eta + 1)) ** 2
+
+
+def dielectric(cos: Tensor, *, eta: Tensor) -> Tensor:
+    r"""Unpolarised reflectance of a smooth interface between transparent media, exact.
+
+    .. math::
+        F = \tfrac12 \left[\Big(\frac{c-g}{c+g}\Big)^2 + \Big(\frac{\eta^2 c - g}{\eta^2 c + g}\Big)^2\right],
+        \quad g = \sqrt{\eta^2 - 1 + c^2}
+
+    Args:
+        cos: cosine c of incidence, broadcasts with eta. [-] in (0, 1]
+        eta: index of the far medium relative to the near one. [-] > 0; below 1 light can be reflected totally.
+    Returns: F, shapes broadcast. [-] 1, with zero gradient, beyond the critical angle.
+    Deviations: none. Both differences are written as products of eta^2 - 1, so that F keeps its digits
+        for eta near 1.
+    Source: Fresnel 1823; Shirley et al., Fundamentals of Computer Graphics, ch. 25.
+    """
+    contrast = (eta - 1) * (eta + 1)
+    g_squared = contrast + cos * cos
+    g = safe_sqrt(g_squared)
+    eta_squared = eta * eta
+    s = contrast / (cos + g) ** 2
+    p = contrast * ((eta_squared + 1) * cos * cos - 1) / (eta_squared * cos + g) ** 2
+    return (0.5 * (s * s + p * p)).masked_fill(g_squared <= 0, 1.0)
+
+
+def conductor(cos: Tensor, *, eta: Tensor, k: Tensor) -> Tensor:
+    r"""Unpolarised reflectance of a smooth absorbing interface of index eta + i k, exact.
+
+    Real arithmetic: :math:`a + i b = \sqrt{(\eta + i k)^2 - 1 + c^2}`, :math:`s^2 = 1 - c^2`,
+
+    .. math::
+        R_s = \frac{(c-a)^2 + b^2}{(c+a)^2 + b^2}, \quad
+        R_p = R_s \frac{(c a - s^2)^2 + c^2 b^2}{(c a + s^2)^2 + c^2 b^2}, \quad F = \tfrac12 (R_s + R_p)
+
+    Args:
+        cos: cosine c of incidence, broadcasts with eta and k. [-] in (0, 1]
+        eta, k: real and imaginary part of the relative index. [-] > 0, >= 0
+    Returns: F, shapes broadcast. [-]
+    Deviations: none; k = 0 is `dielectric`.
+    Source: Born & Wolf, Principles of Optics, ch. 14.
+    """
+    sine_squared = ((1 - cos) * (1 + cos)).relu()
+    real = (eta - 1) * (eta + 1) - k * k + cos * cos
+    imaginary = 2 * eta * k
+    modulus = safe_sqrt(real * real + imaginary * imaginary)
+    larger = 0.5 * (modulus + real.abs())
+    smaller = safe_divide(imaginary * imaginary, 4 * larger, where=larger > 0)
+    propagating = real >= 0
+    a_squared = torch.where(propagating, larger, smaller)
+    b_squared = torch.where(propagating, smaller, larger)
+    a = safe_sqrt(a_squared)
+    r_s = ((cos - a) ** 2 + b_squared) / ((cos + a) ** 2 + b_squared)
+    absorbed = cos * cos * b_squared
+    p_over_s = ((cos * a - sine_squared) ** 2 + absorbed) / ((cos * a + sine_squared) ** 2 + absorbed)
+    return 0.5 * r_s * (1 + p_over_s)
+
+
+def dielectric_average(*, eta: Tensor) -> Tensor:
+    r"""Reflectance of a smooth dielectric under uniform light, :math:`2 \int_0^1 F(c)\, c\, dc`, closed form.
+
+    Args:
+        eta: relative index. [-] > 1
+    Returns: average, shape of eta. [-]
+    Raises: ValueError for eta outside [1, inf).
+    Deviations: terms of size (eta - 1)^-2 cancel towards eta = 1. Computed in float64 whatever the dtype: relative
+        error 1e-13 at 1.5, 1e-9 at 1.01; 0 at eta = 1.
+    Source: Walsh 1926.
+    """
+    REFRACTIVE_INDEX.check("dielectric_average: eta", eta)
+    matched = eta <= 1
+    n = eta.masked_fill(matched, 2.0).to(torch.float64)
+    n2, n4 = n**2, n**4
+    average = (
+        0.5
+        + (n - 1) * (3 * n + 1) / (6 * (n + 1) ** 2)
+        + n2 * (n2 - 1) ** 2 / (n2 + 1) ** 3 * ((n - 1) / (n + 1)).log()
+        - 2 * n**3 * (n2 + 2 * n - 1) / ((n2 + 1) * (n4 - 1))
+        + 8 * n4 * (n4 + 1) / ((n2 + 1) * (n4 - 1) ** 2) * n.log()
+    )
+    return average.to(eta.dtype).masked_fill(matched, 0.0)
+
+
+class Fresnel(Parametric, ABC):
+    """Reflectance of a smooth interface as a part of a BRDF: module from cosines (...) to F (..., channel)."""
+
+    @abstractmethod
+    def forward(self, cos: Tensor) -> Tensor:
+        """F (..., channel) at the cosine of incidence (...). [-]"""
+
+    @abstractmethod
+    def average(self) -> Tensor:
+        """F under uniform light, the mean over 2 c dc (..., channel). [-]"""
+
+
+@final
+class Perfect(Fresnel):
+    """Reflects everything: F = 1."""
+
+    def forward(self, cos: Tensor) -> Tensor:
+        return torch.ones_like(cos)[..., None]
+
+    def average(self) -> Tensor:
+        return torch.ones(1)
+
+
+@final
+class Schlick(Fresnel):
+    """`schlick` with reflectance f0 at normal incidence, scalar, (channel,) or (..., channel). [-] in [0, 1]"""
+
+    f0: Constrained = Constrained(ALBEDO)
+
+    def __init__(self, *, f0: Tensor | float | fixed = 0.04):
+        super().__init__()
+        self.f0 = f0
+
+    def forward(self, cos: Tensor) -> Tensor:
+        return schlick(cos[..., None], f0=torch.atleast_1d(self.f0))
+
+    def average(self) -> Tensor:
+        f0 = torch.atleast_1d(self.f0)
+        return (1 + 20 * f0) / 21
+
+
+@final
+class Dielectric(Fresnel):
+    """`dielectric` with relative index eta, scalar, (channel,) or (..., channel). [-] > 1"""
+
+    eta: Constrained = Constrained(REFRACTIVE_INDEX)
+
+    def __init__(self, *, eta: Tensor | float | fixed = 1.5):
+        super().__init__()
+        self.eta = eta
+
+    def forward(self, cos: Tensor) -> Tensor:
+        return dielectric(cos[..., None], eta=torch.atleast_1d(self.eta))
+
+    def average(self) -> Tensor:
+        return dielectric_average(eta=torch.atleast_1d(self.eta))
+
+
+@final
+class Conductor(Fresnel):
+    """`conductor` with complex index eta + i k, each scalar, (channel,) or (..., channel). [-] > 0, > 0"""
+
+    eta: Constrained = Constrained(RELATIVE_INDEX)
+    k: Constrained = Constrained(ABSORPTION_INDEX)
+
+    def __init__(self, *, eta: Tensor | float | fixed = 0.2, k: Tensor | float | fixed = 3.5):
+        super().__init__()
+        self.eta = eta
+        self.k = k
+
+    def forward(self, cos: Tensor) -> Tensor:
+        return conductor(cos[..., None], eta=torch.atleast_1d(self.eta), k=torch.atleast_1d(self.k))
+
+    def average(self, *, nodes: int = 32) -> Tensor:
+        """By Gauss-Legendre quadrature: there is no closed form. Error below 1e-9 for metals."""
+        from numpy.polynomial.legendre import leggauss
+
+        eta, k = torch.atleast_1d(self.eta), torch.atleast_1d(self.k)
+        x, w = (eta.new_tensor(a).reshape(nodes, *(1,) * eta.ndim) for a in leggauss(nodes))
+        c = (1 + x) / 2
+        return (conductor(c, eta=eta, k=k) * c * w).sum(0)

@@ -1,0 +1,51 @@
+"""An anisotropic material whose grain follows one direction in space."""
+
+from typing import final
+
+import torch
+from torch import Tensor
+
+from torchbrdf.brdf import BRDF
+from torchbrdf.directions import Cosines
+from torchbrdf.sampling import Sample
+
+
+@final
+class Oriented(BRDF):
+    """Gives another BRDF its tangent: the projection of a fixed direction onto the surface, like the grain of wood.
+
+    Args:
+        brdf: the material.
+        direction: (3,) of any length; nowhere parallel to a normal.
+    Components: those of the material.
+    Raises: what `Cosines.of` raises. A tangent given to `forward` takes precedence.
+    """
+
+    direction: Tensor
+
+    def __init__(self, brdf: BRDF, direction: Tensor):
+        super().__init__()
+        self.brdf = brdf
+        self.register_buffer("direction", torch.as_tensor(direction).detach().clone())
+
+    @property
+    def anisotropic(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
+        return self.brdf.anisotropic
+
+    def cosines(
+        self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
+    ) -> Cosines:
+        tangent = self.direction if tangent is None else tangent
+        return Cosines.of(normal, light, view, tangent=tangent, normalize=normalize)
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        return self.brdf.evaluate_components(cosines)
+
+    def directional_albedo(self, cos_view: Tensor, *, nodes: int = 32) -> Tensor:
+        return self.brdf.directional_albedo(cos_view, nodes=nodes)
+
+    def sample(self, normal: Tensor, view: Tensor, u: Tensor, *, tangent: Tensor | None = None) -> Sample:
+        return self.brdf.sample(normal, view, u, tangent=self.direction if tangent is None else tangent)
+
+    def pdf(self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None) -> Tensor:
+        return self.brdf.pdf(normal, light, view, tangent=self.direction if tangent is None else tangent)

@@ -1,0 +1,99 @@
+"""Mirror-like V-cavities with Gaussian facet angles: the specular partner of Oren-Nayar."""
+
+from typing import final
+
+import torch
+from torch import Tensor
+
+from torchbrdf.brdf import BRDF
+from torchbrdf.directions import Cosines
+from torchbrdf.fresnel import Fresnel, Perfect
+from torchbrdf.microfacet import (
+    HalfVector,
+    slope_area,
+    slope_area_angle,
+    slope_area_norm,
+    tangent_squared,
+    v_cavity_masking,
+    visible_azimuth,
+)
+from torchbrdf.parameters import ROUGHNESS, Constrained, fixed
+from torchbrdf.sampling import along_view, mirrored
+
+
+def torrance_sparrow(
+    cosines: Cosines, *, sigma: Tensor, fresnel: Tensor | float = 1.0, normalised: bool = True
+) -> Tensor:
+    r"""Specular reflectance of V-cavities, slope-area convention.
+
+    .. math::
+        f_r = \frac{F\,G\,P(\theta_a)}{4 \cos\theta_i \cos\theta_r \cos\theta_a}, \quad
+        P = c\,e^{-\theta_a^2 / 2 \sigma^2}
+
+    where theta_a is the angle between normal and half vector, P the share of projected area and G
+    `v_cavity_masking`.
+
+    Args:
+        cosines: of light, view and phase angle, each (...).
+        sigma: roughness, scalar or (...). [rad] in (0, pi/2]
+        fresnel: F at the half vector (..., channel). [-]
+        normalised: False leaves out c/4, as (31) does, for k_s values of the paper: then k_s has the unit 1/sr.
+    Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
+    Raises: ValueError when sigma leaves its domain.
+    Deviations: grows as 1/cos^2 towards grazing in the mirror direction, while the directional albedo stays
+        <= 1; single reflection only.
+    Source: Torrance & Sparrow 1967; Oren & Nayar 1994, eqs. (31)-(33), with Min for the misprinted Max.
+    """
+    ROUGHNESS.check("torrance_sparrow: sigma", sigma)
+    half = HalfVector.of(cosines)
+    return cosines.zero_below_horizon(_lobe(cosines, half, sigma, normalised)[..., None] * fresnel)
+
+
+def _lobe(cosines: Cosines, half: HalfVector, sigma: Tensor, normalised: bool) -> Tensor:
+    spread = slope_area(half, sigma=sigma) / 4
+    if not normalised:
+        spread = 4 * (spread * slope_area_norm(sigma))
+    return v_cavity_masking(cosines, half) * spread / (cosines.light * cosines.view * half.cos)
+
+
+@final
+class TorranceSparrow(BRDF):
+    """Specular V-cavities as a module; see `torrance_sparrow` for equation, units and deviations.
+
+    Args:
+        sigma: roughness, scalar or (...). [rad]
+        fresnel: reflectance of a facet; Perfect (F = 1) if not given.
+        normalised: False leaves out c/4, as (31) of Oren & Nayar does.
+    Components: specular.
+    Raises: ValueError outside the domain.
+
+    The body and surface mixture (32) of Oren & Nayar is `k_b * OrenNayar(...) + k_s * TorranceSparrow(...)`.
+    """
+
+    sigma: Constrained = Constrained(ROUGHNESS)
+
+    def __init__(self, *, sigma: Tensor | float | fixed = 0.3, fresnel: Fresnel | None = None, normalised: bool = True):
+        super().__init__()
+        self.sigma = sigma
+        self.fresnel = Perfect() if fresnel is None else fresnel
+        self.normalised = normalised
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        half = HalfVector.of(cosines)
+        lobe = _lobe(cosines, half, self.sigma, self.normalised)
+        return {"specular": lobe[..., None] * self.fresnel(half.cos_light)}
+
+    def propose(self, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:
+        """Facets in proportion to their visible area: a facet of the cavity, or its partner."""
+        theta = slope_area_angle(u[..., 0], self.sigma)
+        sine, cosine = theta.sin(), theta.cos()
+        slope = (sine / cosine) * tangent_squared(view[..., 2]).sqrt()
+        phi = visible_azimuth(u[..., 1].expand_as(slope), slope)
+        facet = torch.stack(torch.broadcast_tensors(sine * phi.cos(), sine * phi.sin(), cosine), -1)
+        light = mirrored(view, along_view(facet, view, back=True))
+        return light, torch.zeros_like(light[..., 0], dtype=torch.bool)
+
+    def density(self, cosines: Cosines) -> Tensor:
+        half = HalfVector.of(cosines)
+        seen = (half.cos_light / (cosines.view * half.cos)).clamp(max=2.0)
+        return slope_area(half, sigma=self.sigma) * seen / (4 * half.cos_light)
