@@ -107,7 +107,7 @@ def _judge_one(entry: Unknown, label: str, raw: Tensor, raw_error: Tensor) -> tu
     to_unit = 180 / torch.pi if domain.unit == "rad" else 1.0
     unit = " deg" if domain.unit == "rad" else ""
     for bound in (domain.low, domain.high):
-        if not domain.even and abs(value - bound) < _FLAT * width:
+        if not domain.even and abs(value - bound) < _FLAT * min(width, 1.0):
             hint = "; are exposure and irradiance right?" if bound == 1 else ""
             return "at bound", f"{label} ran into its bound {bound * to_unit:.4g}{unit}{hint}"
     if domain.even and value - domain.low < error:
