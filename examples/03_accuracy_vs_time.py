@@ -62,6 +62,7 @@ def draw(rows: list[dict], front: set[str], machine: str, path: Path) -> None:
         )
     line = sorted((row["forward"], row["rms_error"]) for row in rows if row["name"] in front)
     axis.step(*zip(*line, strict=True), where="post", color="tab:red", linewidth=0.8, label="Pareto front")
+    axis.margins(x=0.2)
     axis.set(xlabel=f"forward time relative to Lambert ({machine})", ylabel="rms relative error of the BRDF")
     axis.legend()
     axis.grid(alpha=0.3)
