@@ -12,7 +12,7 @@ from torch import Tensor, nn
 
 from inverse.lights import Distant, Light
 from inverse.scene import Scene
-from inverse.shading import cosines_to, shader, to_image
+from inverse.shading import cosines_to, received, shader, to_image
 from torchbrdf import BRDF, LinearBRDF
 
 Predict = Callable[[dict[str, Tensor]], Tensor]
@@ -88,8 +88,7 @@ def _lit_basis(scene: Scene, model: LinearBRDF, light: Light) -> Tensor:
     """The model's geometry images times cosine and irradiance (point, 1 or channel, K)."""
     assert isinstance(light, Distant)
     cosines = cosines_to(light, scene.surface)
-    irradiance = torch.atleast_1d(torch.as_tensor(light.irradiance)).to(cosines.light)
-    return (cosines.light[:, None] * irradiance)[..., None] * model.basis(cosines)[:, None, :]
+    return received(cosines, light)[..., None] * model.basis(cosines)[:, None, :]
 
 
 def _general(scene: Scene, pixels: Tensor) -> Callable[[BRDF], Tensor]:

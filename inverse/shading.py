@@ -22,10 +22,15 @@ def cosines_to(light: Distant, surface: Surface) -> Cosines:
     return Cosines.of(normals, light.direction.to(normals), view, normalize=True)
 
 
+def received(cosines: Cosines, light: Distant) -> Tensor:
+    """cos(light) irradiance (point, 1 or channel)."""
+    irradiance = torch.atleast_1d(torch.as_tensor(light.irradiance)).to(cosines.light)
+    return cosines.light[:, None] * irradiance
+
+
 def reflected(model: BRDF, cosines: Cosines, light: Distant) -> Tensor:
     """f_r cos(light) irradiance (point, channel)."""
-    irradiance = torch.as_tensor(light.irradiance).to(cosines.light)
-    return model.evaluate(cosines) * (cosines.light[..., None] * irradiance)
+    return model.evaluate(cosines) * received(cosines, light)
 
 
 def ambient_reflected(model: BRDF, surface: Surface, light: Ambient) -> Tensor:
