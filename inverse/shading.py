@@ -37,7 +37,7 @@ def ambient_reflected(model: BRDF, surface: Surface, light: Ambient) -> Tensor:
     """Radiance (point, channel) under uniform light: the directional albedo times its radiance.
 
     The albedo is smooth in the view cosine, so it is computed at a few and interpolated by the
-    polynomial through them (1e-4 for the Oren-Nayar models up to 85 degrees). A per-texel material has
+    polynomial through them (3e-4 for the Oren-Nayar models up to 85 degrees). A per-texel material has
     an albedo of its own at each point, which is integrated there, with fewer nodes.
     """
     normals = surface.normals[surface.mask]

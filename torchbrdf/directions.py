@@ -80,7 +80,7 @@ class Cosines:
                 the part along the surface counts, scaled to unit length. Isotropic models ignore it.
             normalize: scale the vectors to unit length instead of refusing others.
         Raises:
-            TypeError: a dtype other than float32 and float64 (half types lose up to 20 % at grazing
+            TypeError: a dtype other than float32 and float64 (half types lose their digits at grazing
                 angles), or dtypes that differ.
             ValueError: a trailing dimension other than 3, shapes that do not broadcast, entries that
                 are not finite, or vectors that are not of unit length.

@@ -13,6 +13,7 @@ from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
 from torchbrdf._numerics import angle_over_sine, dot, safe_divide
+from torchbrdf.attenuation import geometric_attenuation
 from torchbrdf.directions import Cosines
 
 # exp(-x^2/2) beyond is below 1e-17 of what lies before.
@@ -32,14 +33,12 @@ class HalfVector:
         cos: normal . h (...), in (0, 1]. [-]
         sine_squared: 1 - cos^2 (...), exactly 0 in the mirror direction. [-]
         cos_light: light . h = view . h (...). [-]
-        length_squared: |light + view|^2 (...). [-]
         tangent, bitangent: components of h in the surface (...); None when no tangent was given.
     """
 
     cos: Tensor
     sine_squared: Tensor
     cos_light: Tensor
-    length_squared: Tensor
     tangent: Tensor | None = None
     bitangent: Tensor | None = None
 
@@ -53,7 +52,7 @@ class HalfVector:
             flat = along * along + across * across
             squared = flat + up * up
             length = squared.sqrt()
-            return cls(up / length, flat / squared, length / 2, squared, along / length, across / length)
+            return cls(up / length, flat / squared, length / 2, along / length, across / length)
         if cosines.vectors is not None:
             normal, light, view = cosines.vectors
             total = light + view
@@ -65,7 +64,7 @@ class HalfVector:
             squared = torch.maximum(2 * (1 + cosines.phase), up * up)
             flat = squared - up * up
         length = squared.sqrt()
-        return cls(up / length, flat / squared, length / 2, squared)
+        return cls(up / length, flat / squared, length / 2)
 
     def tilt_squared(self) -> Tensor:
         """Squared angle between normal and half vector (...). [rad^2]"""
@@ -87,7 +86,9 @@ def v_cavity_masking(cosines: Cosines, half: HalfVector) -> Tensor:
     Deviations: the Oren-Nayar texts print Max for the outer bracket; the derivation, and energy, ask for Min.
     Source: Torrance & Sparrow 1967; Oren & Nayar 1994, eq. (33).
     """
-    return (2 * half.cos * cosines.alpha / half.cos_light).clamp(max=1.0)
+    return geometric_attenuation(
+        half.cos_light, half.cos_light, cos_light=cosines.light, cos_view=cosines.view, cos_facet=half.cos
+    )
 
 
 def slope_area_norm(sigma: Tensor) -> Tensor:

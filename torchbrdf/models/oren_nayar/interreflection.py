@@ -15,7 +15,6 @@ import torch
 from torch import Tensor
 
 from torchbrdf._numerics import safe_divide, safe_sqrt
-from torchbrdf.attenuation import hidden_fraction
 
 
 def two_bounce_factor(hidden_light: Tensor, hidden_view: Tensor, *, cos_slope: Tensor) -> Tensor:
@@ -90,15 +89,6 @@ def two_bounce_facet(light_projection: Tensor, view_projection: Tensor, *, cos_s
         * two_bounce_integrand(-light_projection, view_projection, cos_slope=cos_slope)
         / math.pi
     )
-
-
-def two_bounce_facet_approximate(light_projection: Tensor, view_projection: Tensor, *, cos_slope: Tensor) -> Tensor:
-    """As `two_bounce_facet` with eq. (48) for the exchange; args u.p, u.q, C (...). [1/sr]"""
-    x, y = (1 - light_projection).clamp(min=0), (1 + view_projection).clamp(min=0)
-    factor = two_bounce_factor_approximate(
-        hidden_fraction(-light_projection), hidden_fraction(view_projection), cos_slope=cos_slope
-    )
-    return cos_slope * x * y * factor / math.pi**2
 
 
 def _shortcut(x: Tensor, y: Tensor, cos_slope: Tensor) -> Tensor:

@@ -20,7 +20,6 @@ from torchbrdf.directions import Cosines
 KAPPA = 1.35  # z = KAPPA sigma for small sigma; between the best for direct (1.4) and interreflected light (1.2)
 LEVEL = 1.25  # [rad] where z levels off: slopes end at 90 degrees, so that a wider Gaussian changes little
 KNEE = 0.35  # [rad] of x = sigma^2 / (sigma^2 + KNEE^2), the variable of all series in sigma
-FACTORS = ("1", "D", "P", "G")
 
 Term = tuple[str, int, int, int]  # factor and the powers of A, S, Q
 
