@@ -5,37 +5,65 @@ it, its sensor takes the photograph, and `fit` finds the parameters of a BRDF th
 """
 
 from inverse.bootstrap import bootstrap
+from inverse.camera import photographed, pinhole
 from inverse.fit import FitError, fit
-from inverse.geometry import Surface, cylinder, from_depth, from_normals, plane, revolution, sphere, vase
-from inverse.lights import Ambient, Distant
+from inverse.geometry import (
+    Surface,
+    cuboid,
+    cylinder,
+    orthographic,
+    plane,
+    revolution,
+    side_by_side,
+    sphere,
+    vase,
+)
+from inverse.lights import Ambient, Disc, Distant, Environment, Point
+from inverse.maps import from_depth, from_normals
 from inverse.measured import Measurements, read_gonioreflectometer, read_merl, read_optical_constants
 from inverse.photos import Photographs, read_image, read_stack, usable, write_image, write_stack
 from inverse.profile import belly_row, cross_section, peak_position
+from inverse.radiometry import exitance, irradiance, solid_angle_of_band, solid_angle_of_cone, solid_angle_of_patch
 from inverse.result import FitResult
 from inverse.scene import Scene
 from inverse.sensor import Sensor
 from inverse.shading import render
-from inverse.solids import cuboid, side_by_side
+from inverse.solids import Cuboid, Cylinder, Group, Plane, Revolution, Solid, Sphere
 
 __all__ = [
     "Ambient",
+    "Cuboid",
+    "Cylinder",
+    "Disc",
     "Distant",
+    "Environment",
     "FitError",
     "FitResult",
+    "Group",
     "Measurements",
     "Photographs",
+    "Plane",
+    "Point",
+    "Revolution",
     "Scene",
     "Sensor",
+    "Solid",
+    "Sphere",
     "Surface",
     "belly_row",
     "bootstrap",
     "cross_section",
     "cuboid",
     "cylinder",
+    "exitance",
     "fit",
     "from_depth",
     "from_normals",
+    "irradiance",
+    "orthographic",
     "peak_position",
+    "photographed",
+    "pinhole",
     "plane",
     "read_gonioreflectometer",
     "read_image",
@@ -45,6 +73,9 @@ __all__ = [
     "render",
     "revolution",
     "side_by_side",
+    "solid_angle_of_band",
+    "solid_angle_of_cone",
+    "solid_angle_of_patch",
     "sphere",
     "usable",
     "vase",

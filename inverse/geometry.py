@@ -1,8 +1,8 @@
 """Known geometry: surfaces as images of points, normals and view directions.
 
 Frame, everywhere in this package: x to the right, y up, z towards the camera. An image of H rows
-shows y from +1 (top) to -1 (bottom) and x in proportion. The view is orthographic unless a camera
-matrix is given. Every surface may be sampled finer than its pixels: `samples` = s divides each
+shows y from +1 (top) to -1 (bottom) and x in proportion. The view is orthographic here; `inverse.camera`
+holds the pinhole. Every surface may be sampled finer than its pixels: `samples` = s divides each
 pixel into s x s points, which the shading averages.
 """
 
@@ -11,16 +11,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
-from kornia.filters import spatial_gradient
-from kornia.geometry.depth import depth_to_3d_v2, depth_to_normals
 from scipy.interpolate import CubicSpline
 from torch import Tensor
-from torch.nn.functional import max_pool2d
+
+from inverse.solids import Cuboid, Cylinder, Plane, Revolution, Solid, Sphere
 
 TO_CAMERA = (0.0, 0.0, 1.0)
 # Heights and radii of the default vase: foot, waist, belly, shoulder, neck, lip.
 _VASE_HEIGHTS = (-0.92, -0.86, -0.78, -0.55, -0.20, 0.10, 0.36, 0.58, 0.74, 0.86, 0.92)
 _VASE_RADII = (0.285, 0.300, 0.275, 0.420, 0.585, 0.565, 0.400, 0.225, 0.190, 0.245, 0.300)
+
+# Heights at which the ends of a given profile are looked for.
+_PROFILE_HEIGHTS = 4097
+# Distance of the plane from which parallel rays start, in half image heights: in front of every solid.
+_IN_FRONT = 1e3
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,7 @@ class Surface:
         mask: where the object is (rows, columns), bool.
         view: unit vectors to the camera, (3,) or (rows, columns, 3).
         samples: points per pixel side.
+        solid: the body seen, which may hide lights from itself; None where only the image's side is known.
     """
 
     points: Tensor
@@ -40,6 +45,7 @@ class Surface:
     mask: Tensor
     view: Tensor
     samples: int = 1
+    solid: Solid | None = None
 
     def __post_init__(self):
         shape = self.mask.shape
@@ -95,7 +101,8 @@ def vase_profile() -> CubicSpline:
 def vase(height: int = 512, width: int = 512, *, samples: int = 1, dtype: torch.dtype = torch.float32) -> Surface:
     """The default vase seen from the front."""
     profile = vase_profile()
-    return revolution(profile, profile.derivative(), height, width, samples=samples, dtype=dtype)
+    solid = Revolution(profile, profile.derivative(), _VASE_HEIGHTS[0], _VASE_HEIGHTS[-1])
+    return _front_of(solid, height, width, samples, dtype)
 
 
 def revolution(
@@ -104,19 +111,31 @@ def revolution(
     """Surface of revolution about the vertical axis, seen from the front.
 
     Args:
-        radius: r(y) for a NumPy array of heights; NaN or 0 where there is no surface.
+        radius: r(y) for a NumPy array of heights; NaN or 0 where there is no surface, positive over one
+            interval of heights.
         slope: its derivative dr/dy.
         height, width: pixels of the image.
     From the front nothing hides anything: each height shows the near half of one circle.
     """
+    heights = torch.linspace(-1, 1, _PROFILE_HEIGHTS, dtype=torch.float64)
+    present = heights[torch.as_tensor(radius(heights.numpy())).nan_to_num(0.0) > 0]
+    if not len(present):
+        raise ValueError("revolution.radius must be positive for some height in [-1, 1]; it nowhere is.")
+    solid = Revolution(radius, slope, float(present[0]), float(present[-1]))
+    return _front_of(solid, height, width, samples, dtype)
+
+
+def _front_of(solid: Revolution, height: int, width: int, samples: int, dtype: torch.dtype) -> Surface:
+    """What `orthographic` shows, row by row in closed form."""
     x, y = pixel_grid(height, width, samples=samples, dtype=dtype)
     heights = y[:, :1].double().numpy()
-    r = torch.as_tensor(radius(heights)).nan_to_num(0.0).to(dtype)
-    dr = torch.as_tensor(slope(heights)).nan_to_num(0.0).to(dtype)
+    r = torch.as_tensor(solid.radius(heights)).nan_to_num(0.0).to(dtype)
+    dr = torch.as_tensor(solid.slope(heights)).nan_to_num(0.0).to(dtype)
     mask = x.abs() < r
     z = (r * r - x * x).clamp(min=0).sqrt()
     # gradient of x^2 + z^2 - r(y)^2, up to the factor 2
-    return _surface(torch.stack((x, y, z), -1), torch.stack((x, -r * dr + 0 * x, z), -1), mask, samples)
+    gradient = torch.stack((x, -r * dr + 0 * x, z), -1)
+    return unit_surface(torch.stack((x, y, z), -1), gradient, mask, samples=samples, solid=solid)
 
 
 def sphere(
@@ -124,14 +143,7 @@ def sphere(
     samples: int = 1, dtype: torch.dtype = torch.float32,
 ) -> Surface:  # fmt: skip
     """Sphere of a radius and centre (x, y) in half image heights."""
-    if not radius > 0:
-        raise ValueError(f"sphere.radius must be positive; found {radius}.")
-    x, y = pixel_grid(height, width, samples=samples, dtype=dtype)
-    x, y = x - centre[0], y - centre[1]
-    squared = radius * radius - x * x - y * y
-    z = squared.clamp(min=0).sqrt()
-    normals = torch.stack((x, y, z), -1)
-    return _surface(normals + torch.tensor([*centre, 0.0], dtype=dtype), normals, squared > 0, samples)
+    return orthographic(Sphere(radius, (*centre, 0.0)), height, width, samples=samples, dtype=dtype)
 
 
 def cylinder(
@@ -139,13 +151,7 @@ def cylinder(
     samples: int = 1, dtype: torch.dtype = torch.float32,
 ) -> Surface:  # fmt: skip
     """Upright cylinder seen from the side."""
-    if not (radius > 0 and half_height > 0):
-        raise ValueError(f"cylinder.radius and half_height must be positive; found {radius} and {half_height}.")
-    x, y = pixel_grid(height, width, samples=samples, dtype=dtype)
-    squared = radius * radius - x * x
-    z = squared.clamp(min=0).sqrt()
-    mask = (squared > 0) & (y.abs() < half_height)
-    return _surface(torch.stack((x, y, z), -1), torch.stack((x, torch.zeros_like(x), z), -1), mask, samples)
+    return orthographic(Cylinder(radius, half_height), height, width, samples=samples, dtype=dtype)
 
 
 def plane(
@@ -155,68 +161,73 @@ def plane(
     """Plane through the origin that fills the image; `normal` must face the camera."""
     if not normal[2] > 0 or not all(math.isfinite(k) for k in normal):
         raise ValueError(f"the plane's normal must be finite and face the camera (z > 0); found {normal}.")
-    x, y = pixel_grid(height, width, samples=samples, dtype=dtype)
-    z = -(normal[0] * x + normal[1] * y) / normal[2]
-    normals = torch.tensor(normal, dtype=dtype).expand(*x.shape, 3)
-    return _surface(torch.stack((x, y, z), -1), normals, torch.ones_like(x, dtype=torch.bool), samples)
+    return orthographic(Plane(normal), height, width, samples=samples, dtype=dtype)
 
 
-def from_normals(normals: Tensor, mask: Tensor | None = None) -> Surface:
-    """Surface from a normal map (rows, columns, 3) in this package's frame; scaled to unit length.
-
-    Without a mask, the object is where the vectors are finite and longer than 0.5. Positions are
-    unknown, so z is 0: distant lights only.
-    """
-    if normals.ndim != 3 or normals.shape[-1] != 3 or not normals.is_floating_point():
-        raise ValueError(
-            f"normals must be floating-point of shape (rows, columns, 3); found {normals.dtype} {tuple(normals.shape)}."
-        )
-    if mask is not None and mask.shape != normals.shape[:2]:
-        raise ValueError(f"mask must have the normals' shape {tuple(normals.shape[:2])}; found {tuple(mask.shape)}.")
-    length = normals.norm(dim=-1)
-    object_ = length > 0.5 if mask is None else mask.bool()
-    usable = length.isfinite() & (length > 0)
-    if (object_ & ~usable).any():
-        raise ValueError(f"normals must be finite and non-zero on the object; {(object_ & ~usable).sum()} are not.")
-    rows, columns = object_.shape
-    y, x = torch.meshgrid(-torch.arange(rows), torch.arange(columns), indexing="ij")
-    points = torch.stack((x, y, torch.zeros_like(x)), -1).to(normals.dtype)
-    return _surface(points, normals, object_, 1)
+def cuboid(
+    height: int, width: int, *, half_sizes: tuple[float, float, float] = (0.5, 0.5, 0.5),
+    yaw: float = 30.0, pitch: float = 0.0, samples: int = 1, dtype: torch.dtype = torch.float32,
+) -> Surface:  # fmt: skip
+    """Box centred in the image, in half image heights, turned by yaw about y and then pitch about x. [degree]"""
+    return orthographic(Cuboid(half_sizes, yaw, pitch), height, width, samples=samples, dtype=dtype)
 
 
-def from_depth(depth: Tensor, camera_matrix: Tensor | None = None, mask: Tensor | None = None) -> Surface:
-    """Surface from a depth map (rows, columns), growing away from the camera; normals by kornia.
-
-    Args:
-        depth: in pixel widths for the orthographic view; in any length with a camera matrix.
-        camera_matrix: pinhole intrinsics (3, 3) in pixels, y down as in kornia; None is orthographic.
-        mask: where the object is; without it, where depth is finite and positive.
-    The rim, where a neighbour is missing, is left out of the mask: its normal would mix two surfaces.
-    """
-    if depth.ndim != 2:
-        raise ValueError(f"depth must have shape (rows, columns); found {tuple(depth.shape)}.")
-    object_ = (depth.isfinite() & (depth > 0)) if mask is None else mask.bool() & depth.isfinite()
-    filled = torch.where(object_, depth, torch.zeros_like(depth))[None, None]
-    outside = (~object_).to(depth.dtype)[None, None]
-    interior = max_pool2d(outside, 3, stride=1, padding=1)[0, 0] == 0
-    interior[[0, -1]] = False
-    interior[:, [0, -1]] = False
-    if camera_matrix is None:
-        gradient = spatial_gradient(filled, mode="diff", order=1, normalized=True)[0, 0]
-        # rows run downwards, so d(depth)/dy = -gradient[1]; z = -depth
-        normals = torch.stack((gradient[0], -gradient[1], torch.ones_like(depth)), -1)
-        flat = from_normals(normals, interior)
-        return _surface(torch.cat((flat.points[..., :2], -filled[0, 0, :, :, None]), -1), normals, interior, 1)
-    flip = depth.new_tensor([1.0, -1.0, -1.0])  # kornia: y down, z into the scene, normals away from the camera
-    normals = -depth_to_normals(filled, camera_matrix[None].to(depth.dtype))[0].permute(1, 2, 0) * flip
-    points = depth_to_3d_v2(filled[0], camera_matrix[None].to(depth.dtype))[0] * flip
-    distance = points.norm(dim=-1, keepdim=True)
-    view = torch.where(interior[..., None], -points / distance, depth.new_tensor(TO_CAMERA))
-    return _surface(points, normals, interior, 1, view)
+def orthographic(
+    solid: Solid, height: int, width: int, *, samples: int = 1, dtype: torch.dtype = torch.float32
+) -> Surface:
+    """A solid as a camera at infinity sees it: rays parallel to -z, y from +1 (top) to -1 (bottom)."""
+    x, y = pixel_grid(height, width, samples=samples, dtype=torch.float64)
+    to_camera = x.new_tensor(TO_CAMERA)
+    origin = torch.stack((x, y, torch.full_like(x, _IN_FRONT)), -1)
+    # once more from nearby: the distance from afar has lost three digits
+    away = solid.hit(origin, -to_camera.expand(origin.shape)) - 1
+    origin = origin - away.masked_fill(~away.isfinite(), 0.0)[..., None] * to_camera
+    return seen(solid, origin, -to_camera, to_camera, samples=samples, dtype=dtype)
 
 
-def _surface(points: Tensor, normals: Tensor, mask: Tensor, samples: int, view: Tensor | None = None) -> Surface:
+def seen(solid: Solid, origin: Tensor, direction: Tensor, view: Tensor, *, samples: int, dtype: torch.dtype) -> Surface:
+    """What rays from `origin` (rows, columns, 3) along unit `direction` meet of a solid; `view` as in Surface."""
+    distance, normals = solid.meet(origin, direction.expand(origin.shape))
+    mask = distance.isfinite()
+    reached = origin + distance.masked_fill(~mask, 0.0)[..., None] * direction
+    points = torch.where(mask[..., None], reached, origin * origin.new_tensor((1.0, 1.0, 0.0)))
+    return unit_surface(points.to(dtype), normals.to(dtype), mask, view=view.to(dtype), samples=samples, solid=solid)
+
+
+def unit_surface(
+    points: Tensor, normals: Tensor, mask: Tensor, *,
+    view: Tensor | None = None, samples: int = 1, solid: Solid | None = None,
+) -> Surface:  # fmt: skip
+    """Surface of normals (rows, columns, 3) of any length; the view is orthographic if not given."""
     to_camera = normals.new_tensor(TO_CAMERA)
     length = normals.norm(dim=-1, keepdim=True)
     unit = torch.where(mask[..., None], normals / length, to_camera)
-    return Surface(points, unit, mask, to_camera if view is None else view, samples)
+    return Surface(points, unit, mask, to_camera if view is None else view, samples, solid)
+
+
+def side_by_side(surfaces: list[Surface]) -> Surface:
+    """Objects in neighbouring windows of one image, left to right; all of one height and sampling.
+
+    Each window is a scene of its own: nothing in one shadows another.
+    """
+    heights = {surface.mask.shape[0] for surface in surfaces}
+    samplings = {surface.samples for surface in surfaces}
+    if len(heights) != 1 or len(samplings) != 1 or any(surface.view.ndim > 1 for surface in surfaces):
+        raise ValueError(
+            f"side_by_side needs orthographic surfaces of one height and sampling; found heights {sorted(heights)} "
+            f"and samples {sorted(samplings)}."
+        )
+    pitch = 2 / heights.pop()
+    total = sum(surface.mask.shape[1] for surface in surfaces)
+    points, left = [], 0
+    for surface in surfaces:
+        middle = pitch * (left + surface.mask.shape[1] / 2 - total / 2)
+        points.append(surface.points + surface.points.new_tensor((middle, 0.0, 0.0)))
+        left += surface.mask.shape[1]
+    return Surface(
+        torch.cat(points, 1),
+        torch.cat([surface.normals for surface in surfaces], 1),
+        torch.cat([surface.mask for surface in surfaces], 1),
+        surfaces[0].view,
+        samplings.pop(),
+    )

@@ -30,8 +30,9 @@ from tifffile import TiffFile, TiffPage
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from inverse.geometry import TO_CAMERA, Surface, from_depth, from_normals, pixel_average, sphere
-from inverse.lights import Distant
+from inverse.geometry import TO_CAMERA, Surface, pixel_average, sphere
+from inverse.lights import Distant, Point
+from inverse.maps import from_depth, from_normals
 from inverse.scene import Scene
 
 _SUFFIXES = (".png", ".tga", ".tif", ".tiff")
@@ -163,8 +164,8 @@ def usable(scene: Scene, *, limb: float = 70.0, highlight: float = 0.0, shadow: 
     """Which pixels of which image to trust, (image, rows, columns) bool, from geometry and lights alone.
 
     A mask that followed the fit could improve it by turning the lights away from the object. Left out
-    are points seen at more than `limb` from their normal, lit at more than `shadow` by any distant light
-    of the image, or with the normal within `highlight` of halfway between light and view. [deg]
+    are points seen at more than `limb` from their normal, lit at more than `shadow` by any distant or
+    point light of the image, or with the normal within `highlight` of halfway between light and view. [deg]
     """
     limits = f"limb {limb}, highlight {highlight}, shadow {shadow}"
     if not all(0 <= k <= 90 for k in (limb, highlight, shadow)):
@@ -175,10 +176,10 @@ def usable(scene: Scene, *, limb: float = 70.0, highlight: float = 0.0, shadow: 
     images = []
     for lights in scene.lights:
         kept = near
-        for light in (k for k in lights if isinstance(k, Distant)):  # pyright: ignore[reportGeneralTypeIssues]
-            direction = light.direction.to(normals)
+        for light in (k for k in lights if isinstance(k, Distant | Point)):
+            direction = next(light.arrivals(surface.points.double())).direction
             dull = (normals * normalize(direction + view, dim=-1)).sum(-1) < most_half if highlight > 0 else True
-            kept = kept & (normals @ direction >= least_light) & dull
+            kept = kept & ((normals * direction).sum(-1) >= least_light) & dull
         images.append(pixel_average(kept[..., None].double(), surface.samples)[..., 0] == 1)
     if not torch.stack(images).any():
         raise ValueError(f"usable: no pixel is left with {limits} degrees.")

@@ -10,9 +10,9 @@ from collections.abc import Callable
 import torch
 from torch import Tensor, nn
 
-from inverse.lights import Distant, Light
+from inverse.lights import Ambient, Light
 from inverse.scene import Scene
-from inverse.shading import cosines_to, received, shader, to_image
+from inverse.shading import arrivals, cosines_to, received, shader, to_image
 from torchbrdf import BRDF, LinearBRDF
 
 Predict = Callable[[dict[str, Tensor]], Tensor]
@@ -44,8 +44,8 @@ def predictor(scene: Scene, model: BRDF, pixels: Tensor, *, per_texel: bool) -> 
             "per-texel parameters need a surface with samples=1 and a sensor with psf_sigma=0; "
             f"found samples={scene.surface.samples}, psf_sigma={scene.sensor.psf_sigma} pixel."
         )
-    distant = all(isinstance(light, Distant) for lights in scene.lights for light in lights)
-    if isinstance(model, LinearBRDF) and distant:
+    ambient = any(isinstance(light, Ambient) for lights in scene.lights for light in lights)
+    if isinstance(model, LinearBRDF) and not ambient:
         compute = _linear(scene, model, pixels)
     else:
         compute = _general(scene, pixels)
@@ -86,9 +86,12 @@ def _linear(scene: Scene, model: LinearBRDF, pixels: Tensor) -> Callable[[BRDF],
 
 def _lit_basis(scene: Scene, model: LinearBRDF, light: Light) -> Tensor:
     """The model's geometry images times cosine and irradiance (point, 1 or channel, K)."""
-    assert isinstance(light, Distant)
-    cosines = cosines_to(light, scene.surface)
-    return received(cosines, light)[..., None] * model.basis(cosines)[:, None, :]
+    assert not isinstance(light, Ambient)
+    total = torch.zeros(())
+    for arrival in arrivals(light, scene.surface):
+        cosines = cosines_to(arrival, scene.surface)
+        total = total + received(cosines, arrival)[..., None] * model.basis(cosines)[:, None, :]
+    return total
 
 
 def _general(scene: Scene, pixels: Tensor) -> Callable[[BRDF], Tensor]:
@@ -100,6 +103,6 @@ def _general(scene: Scene, pixels: Tensor) -> Callable[[BRDF], Tensor]:
         for parts in shaders:
             first, *others = (shade(model) for shade in parts)
             images.append(_recorded(scene, sum(others, first), pixels))
-        return torch.stack(images)
+        return torch.stack(torch.broadcast_tensors(*images))
 
     return compute

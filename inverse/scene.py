@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from inverse.geometry import Surface
-from inverse.lights import Ambient, Distant, Light
+from inverse.lights import Light
 from inverse.sensor import Sensor
 
 
@@ -24,9 +24,9 @@ class Scene:
     sensor: Sensor
 
     def __init__(self, surface: Surface, lights: Sequence[Light | Sequence[Light]], sensor: Sensor | None = None):
-        if isinstance(lights, Distant | Ambient):
+        if isinstance(lights, Light):
             raise TypeError("Scene.lights must be a sequence with one entry for each image; found a single light.")
-        sets = tuple((entry,) if isinstance(entry, Distant | Ambient) else tuple(entry) for entry in lights)
+        sets = tuple((entry,) if isinstance(entry, Light) else tuple(entry) for entry in lights)
         if not sets or not all(sets):
             raise ValueError("Scene.lights must hold at least one image and one light for each; found none.")
         for name, value in (("surface", surface), ("lights", sets), ("sensor", sensor or Sensor())):

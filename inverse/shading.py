@@ -1,13 +1,13 @@
 """Radiance of a surface under lights. The only place where the cosine of the light enters."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
 from inverse.geometry import Surface, pixel_average
-from inverse.lights import Ambient, Distant, Light
+from inverse.lights import Ambient, Arrival, Directional, Disc, Environment, Light
 from inverse.scene import Scene
 from torchbrdf import BRDF, Cosines, is_per_texel
 
@@ -15,22 +15,41 @@ _AMBIENT_TABLE = 24
 _TEXEL_NODES = 16
 
 
-def cosines_to(light: Distant, surface: Surface) -> Cosines:
+def cosines_to(arrival: Arrival, surface: Surface) -> Cosines:
     """Cosines (point,) at the surface's masked points, in row-major order."""
-    normals = surface.normals[surface.mask]
+    normals, view = normals_and_view(surface)
+    return Cosines.of(normals, arrival.direction, view, normalize=True)
+
+
+def normals_and_view(surface: Surface) -> tuple[Tensor, Tensor]:
+    """Normals (point, 3) and view, (3,) or (point, 3), of the masked points."""
     view = surface.view if surface.view.ndim == 1 else surface.view[surface.mask]
-    return Cosines.of(normals, light.direction.to(normals), view, normalize=True)
+    return surface.normals[surface.mask], view
 
 
-def received(cosines: Cosines, light: Distant) -> Tensor:
+def received(cosines: Cosines, arrival: Arrival) -> Tensor:
     """cos(light) irradiance (point, 1 or channel)."""
-    irradiance = torch.atleast_1d(torch.as_tensor(light.irradiance)).to(cosines.light)
-    return cosines.light[:, None] * irradiance
+    return cosines.light[:, None] * arrival.irradiance
 
 
-def reflected(model: BRDF, cosines: Cosines, light: Distant) -> Tensor:
-    """f_r cos(light) irradiance (point, channel)."""
-    return model.evaluate(cosines) * received(cosines, light)
+def arrivals(light: Directional, surface: Surface) -> Iterator[Arrival]:
+    """The directions from which a light reaches the masked points."""
+    return light.arrivals(surface.points[surface.mask])
+
+
+def extended_reflected(model: BRDF, surface: Surface, light: Disc | Environment) -> Tensor:
+    """Radiance (point, channel) under a source of finite size: f_r cos(light) summed over its directions, (31).
+
+    A mirror lobe, which f_r cannot show, reads the source in the mirror direction instead.
+    """
+    normals, view = normals_and_view(surface)
+    total = normals.new_zeros(len(normals), 1)
+    for arrival in arrivals(light, surface):
+        cosines = cosines_to(arrival, surface)
+        total = total + model.evaluate(cosines) * received(cosines, arrival)
+    image = 2 * (normals * view).sum(-1, keepdim=True) * normals - view
+    mirror = model.delta_reflectance(Cosines.of(normals, image, view, normalize=True))
+    return total if mirror is None else total + mirror * light.seen(image)
 
 
 def ambient_reflected(model: BRDF, surface: Surface, light: Ambient) -> Tensor:
@@ -40,8 +59,7 @@ def ambient_reflected(model: BRDF, surface: Surface, light: Ambient) -> Tensor:
     polynomial through them (3e-4 for the Oren-Nayar models up to 85 degrees). A per-texel material has
     an albedo of its own at each point, which is integrated there, with fewer nodes.
     """
-    normals = surface.normals[surface.mask]
-    view = surface.view if surface.view.ndim == 1 else surface.view[surface.mask]
+    normals, view = normals_and_view(surface)
     cos_view = (normals * view).sum(-1).clamp(0, 1)
     if is_per_texel(model):
         return model.directional_albedo(cos_view, nodes=_TEXEL_NODES) * torch.as_tensor(light.radiance).to(cos_view)
@@ -54,11 +72,17 @@ def ambient_reflected(model: BRDF, surface: Surface, light: Ambient) -> Tensor:
 
 
 def shader(surface: Surface, light: Light) -> Callable[[BRDF], Tensor]:
-    """Function from a model to its radiance (point, channel) under one light; the geometry is done once."""
+    """Function from a model to its radiance (point, channel) under one light.
+
+    The geometry of a light with one direction is done once; of more there would be too much to keep.
+    """
     if isinstance(light, Ambient):
         return lambda model: ambient_reflected(model, surface, light)
-    cosines = cosines_to(light, surface)
-    return lambda model: reflected(model, cosines, light)
+    if isinstance(light, Disc | Environment):
+        return lambda model: extended_reflected(model, surface, light)
+    arrival = next(arrivals(light, surface))
+    cosines = cosines_to(arrival, surface)
+    return lambda model: model.evaluate(cosines) * received(cosines, arrival)
 
 
 def radiance(model: BRDF, surface: Surface, lights: tuple[Light, ...]) -> Tensor:
@@ -87,4 +111,5 @@ def to_image(values: Tensor, surface: Surface) -> Tensor:
 
 def render(scene: Scene, model: BRDF) -> Tensor:
     """Radiance images (image, rows, columns, channel), averaged over each pixel, before the sensor."""
-    return torch.stack([to_image(radiance(model, scene.surface, lights), scene.surface) for lights in scene.lights])
+    images = [to_image(radiance(model, scene.surface, lights), scene.surface) for lights in scene.lights]
+    return torch.stack(torch.broadcast_tensors(*images))

@@ -8,8 +8,6 @@ import torch
 from inverse.geometry import (
     Surface,
     cylinder,
-    from_depth,
-    from_normals,
     pixel_average,
     pixel_grid,
     plane,
@@ -18,6 +16,7 @@ from inverse.geometry import (
     vase,
     vase_profile,
 )
+from inverse.maps import from_depth, from_normals
 
 D = torch.float64
 SURFACES = {

@@ -6,10 +6,11 @@ from itertools import pairwise
 import pytest
 import torch
 
-from inverse.geometry import cylinder, from_depth, plane, sphere
+from inverse.geometry import cylinder, plane, sphere
 from inverse.lights import Ambient, Distant
+from inverse.maps import from_depth
 from inverse.scene import Scene
-from inverse.shading import cosines_to, radiance, render, to_image
+from inverse.shading import arrivals, cosines_to, radiance, render, to_image
 from torchbrdf import Lambert, OrenNayar, QualitativeOrenNayar
 
 D = torch.float64
@@ -200,7 +201,7 @@ def test_angles_count_to_the_right_of_the_camera():
 
 def test_cosines_come_from_the_masked_points():
     surface = sphere(9, 9, dtype=D)
-    cosines = cosines_to(Distant.from_angle(0), surface)
+    cosines = cosines_to(next(arrivals(Distant.from_angle(0), surface)), surface)
     torch.testing.assert_close(cosines.light, surface.normals[surface.mask][:, 2])
     torch.testing.assert_close(cosines.view, cosines.light)
     torch.testing.assert_close(cosines.phase, torch.ones_like(cosines.light))
@@ -209,7 +210,7 @@ def test_cosines_come_from_the_masked_points():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Distant(torch.zeros(3)), r"Distant\.direction must be a finite non-zero vector"),
+        (lambda: Distant(torch.zeros(3)), r"Distant\.direction must be a vector \(3,\) other than 0"),
         (lambda: Distant(torch.tensor([0.0, math.nan, 1.0])), r"Distant\.direction"),
         (lambda: Distant(torch.ones(2)), r"Distant\.direction"),
         (lambda: Distant.from_angle(0, -1.0), r"Distant\.irradiance must be finite and not negative; found -1\.0"),
