@@ -10,9 +10,10 @@ from collections.abc import Callable
 import torch
 from torch import Tensor, nn
 
+from inverse.footprints import Footprints
 from inverse.lights import Ambient, Light
 from inverse.scene import Scene
-from inverse.shading import arrivals, cosines_to, received, shader, to_image
+from inverse.shading import arrivals, cosines_to, received, shader
 from torchbrdf import BRDF, LinearBRDF
 
 Predict = Callable[[dict[str, Tensor]], Tensor]
@@ -57,20 +58,20 @@ def predictor(scene: Scene, model: BRDF, pixels: Tensor, *, per_texel: bool) -> 
     return predict
 
 
-def _recorded(scene: Scene, values: Tensor, pixels: Tensor) -> Tensor:
-    """Values (point, channel) at masked points -> recorded at `pixels` (P, channel)."""
+def _recorded(scene: Scene, where: Footprints, values: Tensor, pixels: Tensor) -> Tensor:
+    """Values (point, channel) -> recorded at `pixels` (P, channel)."""
     if scene.surface.samples == 1 and scene.sensor.psf_sigma == 0:
         return values[pixels[scene.surface.mask]] * scene.sensor.exposure
-    return scene.sensor.focus(to_image(values, scene.surface))[pixels] * scene.sensor.exposure
+    return scene.sensor.focus(where.to_image(values))[pixels] * scene.sensor.exposure
 
 
 def _linear(scene: Scene, model: LinearBRDF, pixels: Tensor) -> Callable[[BRDF], Tensor]:
     with torch.no_grad():
-        images = []
+        images, where = [], scene.footprints()
         for lights in scene.lights:
-            first, *others = (_lit_basis(scene, model, light) for light in lights)
+            first, *others = (_lit_basis(where, model, light) for light in lights)
             total = sum(others, first)  # (point, 1 or channel, K)
-            images.append(_recorded(scene, total.flatten(1), pixels).unflatten(1, total.shape[1:]))
+            images.append(_recorded(scene, where, total.flatten(1), pixels).unflatten(1, total.shape[1:]))
     basis = torch.stack(torch.broadcast_tensors(*images))  # (image, P, 1 or channel, K)
     inside = pixels[scene.surface.mask] if scene.surface.samples == 1 else None
 
@@ -84,25 +85,26 @@ def _linear(scene: Scene, model: LinearBRDF, pixels: Tensor) -> Callable[[BRDF],
     return compute
 
 
-def _lit_basis(scene: Scene, model: LinearBRDF, light: Light) -> Tensor:
+def _lit_basis(where: Footprints, model: LinearBRDF, light: Light) -> Tensor:
     """The model's geometry images times cosine and irradiance (point, 1 or channel, K)."""
     assert not isinstance(light, Ambient)
     total = torch.zeros(())
-    for arrival in arrivals(light, scene.surface):
-        cosines = cosines_to(arrival, scene.surface)
+    for arrival in arrivals(light, where):
+        cosines = cosines_to(arrival, where)
         total = total + received(cosines, arrival)[..., None] * model.basis(cosines)[:, None, :]
     return total
 
 
 def _general(scene: Scene, pixels: Tensor) -> Callable[[BRDF], Tensor]:
     with torch.no_grad():
-        shaders = [[shader(scene.surface, light) for light in lights] for lights in scene.lights]
+        where = scene.footprints()
+        shaders = [[shader(where, light) for light in lights] for lights in scene.lights]
 
     def compute(model: BRDF) -> Tensor:
         images = []
         for parts in shaders:
             first, *others = (shade(model) for shade in parts)
-            images.append(_recorded(scene, sum(others, first), pixels))
+            images.append(_recorded(scene, where, sum(others, first), pixels))
         return torch.stack(torch.broadcast_tensors(*images))
 
     return compute

@@ -1,14 +1,16 @@
 """Solid angles, irradiance and exitance: what the lights bring to a surface and what it sends back."""
 
 import math
+from dataclasses import replace
 
 import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
+from inverse.footprints import footprints
 from inverse.geometry import Surface
 from inverse.lights import Ambient, Light
-from inverse.shading import arrivals, normals_and_view, radiance
+from inverse.shading import arrivals, radiance
 from torchbrdf import BRDF
 
 
@@ -37,15 +39,16 @@ def solid_angle_of_patch(area: float, cosine: float, distance: float) -> float:
 def irradiance(surface: Surface, lights: tuple[Light, ...]) -> Tensor:
     """Irradiance (point, channel) that lights give the masked points of a surface: (24), (26).
 
-    Only the surface's own tilt counts, not what stands in the way. pi L under ambient light.
+    pi L under ambient light.
     """
-    normals, _ = normals_and_view(surface)
+    where = footprints(surface)
+    normals = where.normals
     total = normals.new_zeros(len(normals), 1)
     for light in lights:
         if isinstance(light, Ambient):
             total = total + math.pi * torch.atleast_1d(torch.as_tensor(light.radiance)).to(normals)
             continue
-        for arrival in arrivals(light, surface):
+        for arrival in arrivals(light, where):
             cosine = (normals * arrival.direction).sum(-1, keepdim=True).clamp(min=0)
             total = total + cosine * arrival.irradiance
     return total
@@ -57,13 +60,12 @@ def exitance(model: BRDF, surface: Surface, lights: tuple[Light, ...], *, nodes:
     Quadrature of the radiance over the views: `nodes` Gauss-Legendre cosines times 2 `nodes` azimuths. A lobe narrower
     than the nodes are apart is missed; a mirror lobe is left out.
     """
-    normals, _ = normals_and_view(surface)
+    where = footprints(surface)
+    normals = where.normals
     axes = torch.nn.functional.one_hot(normals.abs().argmin(-1), 3).to(normals)
     across = torch.linalg.cross(normals, axes)
     across = across / across.norm(dim=-1, keepdim=True)
     turned = torch.linalg.cross(normals, across)
-    points = surface.points[surface.mask]
-    everywhere = torch.ones(len(points), 1, dtype=torch.bool, device=points.device)
     total = normals.new_zeros(len(normals), 1)
     for x, weight in zip(*leggauss(nodes), strict=True):
         cos = (1 + x) / 2
@@ -71,6 +73,5 @@ def exitance(model: BRDF, surface: Surface, lights: tuple[Light, ...], *, nodes:
         for step in range(2 * nodes):
             azimuth = math.pi * (step + 0.5) / nodes
             view = cos * normals + sin * (math.cos(azimuth) * across + math.sin(azimuth) * turned)
-            column = Surface(points[:, None], normals[:, None], everywhere, view[:, None])
-            total = total + radiance(model, column, lights) * (cos * weight / 2 * math.pi / nodes)
+            total = total + radiance(model, replace(where, view=view), lights) * (cos * weight / 2 * math.pi / nodes)
     return total

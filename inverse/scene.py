@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from inverse.footprints import Footprints, footprints
 from inverse.geometry import Surface
 from inverse.lights import Light
 from inverse.sensor import Sensor
@@ -31,6 +32,10 @@ class Scene:
             raise ValueError("Scene.lights must hold at least one image and one light for each; found none.")
         for name, value in (("surface", surface), ("lights", sets), ("sensor", sensor or Sensor())):
             object.__setattr__(self, name, value)
+
+    def footprints(self) -> Footprints:
+        """The points to shade, and the pixels they make up."""
+        return footprints(self.surface)
 
     @property
     def images(self) -> int:
