@@ -1,7 +1,9 @@
 """What was photographed, and what is known of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from torch import Tensor
 
 from inverse.footprints import Footprints, footprints
 from inverse.geometry import Surface
@@ -17,25 +19,45 @@ class Scene:
         surface: known geometry.
         lights: for each image its lights; on construction a single light may stand for a set of one.
         sensor: the fit uses its exposure and point-spread function.
+        shadows: whether the solid hides lights from itself, where the surface knows its solid.
+        between_parts: whether parts of the solid light each other.
+        detail: pixels (rows, columns) that are shaded at all their points; see `footprints`. None: all.
     Raises: ValueError when there is no image; TypeError for a light outside a sequence.
     """
 
     surface: Surface
     lights: tuple[tuple[Light, ...], ...]
     sensor: Sensor
+    shadows: bool
+    between_parts: bool
+    detail: Tensor | None
 
-    def __init__(self, surface: Surface, lights: Sequence[Light | Sequence[Light]], sensor: Sensor | None = None):
+    def __init__(
+        self,
+        surface: Surface,
+        lights: Sequence[Light | Sequence[Light]],
+        sensor: Sensor | None = None,
+        *,
+        shadows: bool = True,
+        between_parts: bool = False,
+        detail: Tensor | None = None,
+    ):
         if isinstance(lights, Light):
             raise TypeError("Scene.lights must be a sequence with one entry for each image; found a single light.")
         sets = tuple((entry,) if isinstance(entry, Light) else tuple(entry) for entry in lights)
         if not sets or not all(sets):
             raise ValueError("Scene.lights must hold at least one image and one light for each; found none.")
-        for name, value in (("surface", surface), ("lights", sets), ("sensor", sensor or Sensor())):
+        values = {
+            "surface": surface, "lights": sets, "sensor": sensor or Sensor(),
+            "shadows": shadows, "between_parts": between_parts, "detail": detail,
+        }  # fmt: skip
+        for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def footprints(self) -> Footprints:
         """The points to shade, and the pixels they make up."""
-        return footprints(self.surface)
+        surface = self.surface if self.shadows else replace(self.surface, solid=None)
+        return footprints(surface, self.detail)
 
     @property
     def images(self) -> int:

@@ -19,8 +19,15 @@ from torchbrdf.brdf import (
 from torchbrdf.directions import (
     Cosines,
 )
+from torchbrdf.effects import (
+    Option,
+    compact,
+    options,
+    simulated,
+)
 from torchbrdf.fresnel import (
     Conductor,
+    ConstantFresnel,
     Dielectric,
     Fresnel,
     Perfect,
@@ -149,6 +156,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "ClosedFormRoughSurface",
     "ClosedFormVCavities",
     "Conductor",
+    "ConstantFresnel",
     "Constrained",
     "Cosines",
     "Coupled",
@@ -171,6 +179,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Minnaert",
     "Mirror",
     "ModifiedPhong",
+    "Option",
     "OrenNayar",
     "Oriented",
     "Perfect",
@@ -187,6 +196,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "UnidirectionalVCavities",
     "WeightedSum",
     "burley",
+    "compact",
     "conductor",
     "dielectric",
     "dielectric_average",
@@ -199,6 +209,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "is_per_texel",
     "lambert_sphere_fast",
     "minnaert",
+    "options",
     "oren_nayar",
     "phong_radiance",
     "qualitative",
@@ -209,6 +220,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "sigma_from_beckmann_alpha",
     "sigma_from_degrees",
     "sigma_from_mean_slope",
+    "simulated",
     "smith_correlated",
     "smith_separable",
     "tabulated_weights",

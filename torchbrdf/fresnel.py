@@ -154,6 +154,23 @@ class Perfect(Fresnel):
 
 
 @final
+class ConstantFresnel(Fresnel):
+    """The same reflectance at every angle, scalar, (channel,) or (..., channel). [-] in [0, 1]"""
+
+    value: Constrained = Constrained(ALBEDO)
+
+    def __init__(self, *, value: Tensor | float | fixed):
+        super().__init__()
+        self.value = value
+
+    def forward(self, cos: Tensor) -> Tensor:
+        return torch.ones_like(cos)[..., None] * torch.atleast_1d(self.value)
+
+    def average(self) -> Tensor:
+        return torch.atleast_1d(self.value)
+
+
+@final
 class Schlick(Fresnel):
     """`schlick` with reflectance f0 at normal incidence, scalar, (channel,) or (..., channel). [-] in [0, 1]"""
 

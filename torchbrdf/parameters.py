@@ -208,6 +208,12 @@ def trainable(module: nn.Module) -> dict[str, tuple[str, Interval | Simplex]]:
     return found
 
 
+def kept(module: Parametric, name: str) -> Tensor | fixed:
+    """A parameter's value for another module of the same material: held fixed where the given module holds it."""
+    value = getattr(module, name).detach()
+    return fixed(value) if f"fixed_{name}" in module._buffers else value
+
+
 def is_per_texel(module: nn.Module) -> bool:
     """Whether any parameter has one entry for each pixel."""
     return any(

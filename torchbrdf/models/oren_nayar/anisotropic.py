@@ -1,7 +1,7 @@
 """Rough surface whose slopes spread differently along the tangent and across it."""
 
 import math
-from typing import final
+from typing import Literal, final
 
 import torch
 from torch import Tensor
@@ -53,7 +53,7 @@ class AnisotropicRoughSurface(ImageBRDF):
         sigma_y: Tensor | float | fixed = 0.3,
         nodes: int = 16,
         azimuths: int = 24,
-        bounces: int = 2,
+        bounces: Literal[1, 2] = 2,
     ):
         super().__init__()
         if bounces not in (1, 2) or nodes < 2 or azimuths < 2:
@@ -66,6 +66,7 @@ class AnisotropicRoughSurface(ImageBRDF):
         self.sigma_y = sigma_y
         self.nodes = nodes
         self.azimuths = azimuths
+        self.bounces: Literal[1, 2] = bounces
         self._bounces = Bounces(two=bounces > 1, modes=0)
 
     def coordinates(self, cosines: Cosines) -> tuple[Tensor, ...]:

@@ -44,22 +44,24 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
     return cosines.zero_below_horizon(torch.as_tensor(f))
 
 
-def geometry_terms(cosines: Cosines) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """The four functions of geometry in (27), (28), each (...), without an angle.
 
     1, cos(dphi) C2 tan(beta) and (1 - |cos(dphi)|) C3 tan((alpha+beta)/2) with the constants and the
     sigma-quotients taken out, and cos(dphi) (2 beta/pi)^2. Every quotient left is bounded or has
-    the larger cosine below it.
+    the larger cosine below it. Without `c3` the third is 0.
     """
     g = cosines
     beta_squared = g.sin_beta * g.sin_beta * g.beta_over_sine**2
     # tan(beta) cos(dphi) = (in_plane / sin(alpha)) / cos(beta); the cubic only acts where dphi > 90 deg
     forward = g.in_plane.clamp(max=0) * g.sine_ratio * (2 / math.pi) ** 3 * g.beta_over_sine * beta_squared
     along = (g.in_plane - forward) / g.beta
+    bounce = g.in_plane * g.sine_ratio * g.beta_over_sine**2 * (2 / math.pi) ** 2
+    if not c3:
+        return torch.ones_like(g.beta), along, torch.zeros_like(g.beta), bounce
     tan_mean = (g.sin_alpha + g.sin_beta) / (g.alpha + g.beta)
     angles = (4 / math.pi**2) ** 2 * (g.alpha_over_sine * g.beta_over_sine) ** 2
     across = g.across_plane * g.sin_alpha * g.sin_beta * angles * tan_mean
-    bounce = g.in_plane * g.sine_ratio * g.beta_over_sine**2 * (2 / math.pi) ** 2
     return torch.ones_like(g.beta), along, across, bounce
 
 
@@ -92,6 +94,7 @@ class OrenNayar(CltcSampled, LinearBRDF):
         sigma: roughness, scalar or (...). [rad]
         direct: include light reflected once.
         interreflection: include light reflected twice inside a cavity.
+        c3: include the term of C3, which acts across the plane of incidence alone.
     Components: direct, interreflection (those included).
     Raises: ValueError outside the domains, or when both parts are switched off.
     """
@@ -106,6 +109,7 @@ class OrenNayar(CltcSampled, LinearBRDF):
         sigma: Tensor | float | fixed = 0.3,
         direct: bool = True,
         interreflection: bool = True,
+        c3: bool = True,
     ):
         super().__init__()
         if not (direct or interreflection):
@@ -113,12 +117,13 @@ class OrenNayar(CltcSampled, LinearBRDF):
         self.albedo = albedo
         self.sigma = sigma
         self._parts = {"direct": direct, "interreflection": interreflection}
+        self.c3 = c3
 
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
-        return geometry_terms(cosines)
+        return geometry_terms(cosines, c3=self.c3)
 
     def component_coefficients(self) -> dict[str, Tensor]:
         parts = {"direct": direct_coefficients, "interreflection": interreflection_coefficients}

@@ -30,6 +30,8 @@ class SharedSlopes(ImageBRDF):
         self.nodes = nodes
         self.order = order
         self.graded = graded
+        self.bounces: BounceCount = bounces
+        self.modes = modes
         self._bounces = Bounces.of(name, bounces, modes)
 
     @abstractmethod
