@@ -179,3 +179,15 @@ def test_narrow_lobes_keep_their_digits_in_float32(build):
     errors = {name: float(((value - exact) / exact).abs().median()) for name, value in values.items()}
     assert max(errors["tangent"], errors["vectors"]) < 1e-5
     assert errors["products"] > 1e-4
+
+
+def test_oriented_mixture_keeps_its_mirror():
+    tangent = doubles([1.0, 0.0, 0.0])
+    plain = (0.5 * AshikhminShirley() + 0.4 * Mirror()).double()
+    oriented = Oriented(plain, tangent)
+    cosines = oriented.cosines(*few(5))
+    assert_close(oriented.delta_reflectance(cosines), torch.full((5, 1), 0.4, dtype=torch.float64), rtol=1e-6, atol=0)
+    assert (oriented.delta_probability(cosines) > 0).all()
+    # cosines that a renderer made without the model know no tangent
+    bare = Cosines.of(*few(5))
+    assert_close(oriented.evaluate(bare), plain(*few(5), tangent=tangent))
