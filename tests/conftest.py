@@ -2,7 +2,8 @@
 
 import pytest
 import torch
-from catalog import MODELS, Model
+from catalog import MODELS
+from materials import Model
 
 from torchbrdf.testing import Directions, random_directions
 

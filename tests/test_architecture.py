@@ -10,6 +10,7 @@ import torchbrdf
 ROOT = Path(__file__).parents[1]
 LIBRARY = sorted((ROOT / "torchbrdf").rglob("*.py"))
 PIPELINE = sorted((ROOT / "inverse").rglob("*.py"))
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
 LONGEST = 300
 SMALLEST_UNNAMED = 1e-5
 TOLERANCE_ARGUMENTS = {"rtol", "atol", "xtol", "ftol", "gtol", "tol"}
@@ -95,7 +96,7 @@ def test_pipeline_imports_public_names_only(path):
     assert uses(path) <= public
 
 
-@pytest.mark.parametrize("path", LIBRARY + PIPELINE, ids=named)
+@pytest.mark.parametrize("path", LIBRARY + PIPELINE + TESTS, ids=named)
 def test_files_are_short(path):
     assert len(path.read_text().splitlines()) < LONGEST
 

@@ -164,7 +164,8 @@ def cltc_density(cosines: Cosines, roughness: Tensor) -> Tensor:
 def equivalent_roughness(sigma: Tensor) -> Tensor:
     """Roughness r of EON (...) whose sampler fits an Oren-Nayar surface of sigma (...) [rad]: B/A of (30), below 0.9.
 
-    Variance relative to the squared mean stays below 0.05 for sigma from 0.2 to 1, at any view.
+    Variance relative to the squared mean stays below 0.05 for sigma from 0.2 to 1, at any view. The rms slope angle
+    of other distributions serves as well as sigma.
     """
     s2 = sigma * sigma
     return 0.45 * s2 / (s2 + 0.09) / (1 - 0.5 * s2 / (s2 + 0.33))

@@ -74,3 +74,16 @@ def test_figures_of_the_paper(run, tmp_path):
     printed = run("04_paper_figures.py", "--size", 16, "--points", 9, "--output", tmp_path).split()
     assert len(printed) == 12
     assert all(Path(name).exists() for name in printed)
+
+
+def test_laws_catch_the_broken_brdfs_and_pass_the_corrected_one(run):
+    printed = run("08_check_your_brdf.py").splitlines()
+    table = {line[:20].strip(): line[20:].split() for line in printed[: printed.index("")]}
+    assert table.pop("law") == ["FromAngles", "Varnished", "Corrected"]
+    caught = {
+        title: {law for law, row in table.items() if row[k] == "broken"} for k, title in enumerate(("a", "v", "c"))
+    }
+    assert caught == {"a": {"energy", "dark below horizon", "finite"}, "v": {"reciprocal", "energy"}, "c": set()}
+    in_degrees, in_radians = (float(line.split()[-1]) for line in printed[-2:])
+    assert in_degrees > 0.2
+    assert in_radians < 1e-6

@@ -88,7 +88,8 @@ class Coupled(_Polished):
     Components: matte. The mirror lobe is sampled, not evaluated: see `Mirror`.
     Deviations: the matte part has the fitted shape of the paper. With Schlick's F the constant is
         21 (1 - f0)/(20 pi): the published 21/(20 pi (1 - f0)) goes with (1 - F), not with 1 - (1 - c)^5, and as
-        printed reflects 1.10 of the light at f0 = 0.05.
+        printed reflects 1.10 of the light at f0 = 0.05. That also means that photographs show rho (1 - f0) alone: to
+        fit, hold one of the two fixed.
     Source: Shirley et al. 1997; Fundamentals of Computer Graphics, eqs. (25.1)-(25.3), corrected.
     """
 
@@ -124,7 +125,8 @@ class Dampened(_Polished):
         albedo: rho of the body, scalar, (channel,) or (..., channel). [-] in [0, 1]
         fresnel: Schlick (0.04) if not given.
     Components: matte. The mirror lobe is sampled, not evaluated: see `Mirror`.
-    Deviations: not reciprocal: F is that of the view. `Coupled` is the model to use.
+    Deviations: not reciprocal: F is that of the view. `Coupled` is the model to use. With Schlick's F photographs show
+        rho (1 - f0) alone.
     Source: Shirley et al., Fundamentals of Computer Graphics, ch. 25.
     """
 

@@ -11,13 +11,14 @@ from torchbrdf.directions import Cosines
 from torchbrdf.models.oren_nayar.images import Bounces, cavity_images, flat_coefficients
 from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
 from torchbrdf.quadrature import gauss_legendre
+from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 # A quadrature over fixed slope vectors cannot resolve a spread much below the distance of its nodes.
 SPREAD = Interval(math.radians(3), math.pi / 2, "rad")
 
 
 @final
-class AnisotropicRoughSurface(ImageBRDF):
+class AnisotropicRoughSurface(CltcSampled, ImageBRDF):
     r"""V-cavities with Gaussian slopes of two widths, by quadrature over the slope plane.
 
     .. math::
@@ -68,6 +69,11 @@ class AnisotropicRoughSurface(ImageBRDF):
         self.azimuths = azimuths
         self.bounces: Literal[1, 2] = bounces
         self._bounces = Bounces(two=bounces > 1, modes=0)
+
+    def sampling_roughness(self) -> Tensor:
+        # of a view along the wide slopes too much, across them too little: variance 0.13 at worst for 0.1 and 1 rad,
+        # half of what the cosine with a quarter uniform has
+        return equivalent_roughness(((self.sigma_x**2 + self.sigma_y**2) / 2).sqrt())
 
     def coordinates(self, cosines: Cosines) -> tuple[Tensor, ...]:
         """p and q of the slope plane, on tangent and bitangent."""

@@ -17,6 +17,7 @@ from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.models.oren_nayar.ring import KAPPA, KNEE, Ring, Term, chebyshev, chebyshev_slope, contract, knee, ring
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 Bounces = Literal[2, "all"]
 
@@ -177,7 +178,7 @@ def _check_bounces(name: str, bounces: object) -> None:
 
 
 @final
-class FastRoughSurface(BRDF):
+class FastRoughSurface(CltcSampled, BRDF):
     """Fit of the exact V-cavity rough surface as a module; see `fast_rough_surface` for equation, units and deviations.
 
     Args:
@@ -199,6 +200,9 @@ class FastRoughSurface(BRDF):
         self.albedo = albedo
         self.sigma = sigma
         self.bounces: Bounces = bounces
+
+    def sampling_roughness(self) -> Tensor:
+        return equivalent_roughness(self.sigma)
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         return _components(cosines, self.albedo, self.sigma, self.bounces)

@@ -13,12 +13,13 @@ from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, modes_of
 from torchbrdf.models.oren_nayar.images import Bounces, flat_coefficients, mean_images
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane, slope_plane
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Simplex, fixed
+from torchbrdf.sampling import CltcSampled, equivalent_roughness
 from torchbrdf.slopes import gaussian_weights, shared_slopes
 
 BounceCount = Literal[1, 2, "all"]
 
 
-class SharedSlopes(ImageBRDF):
+class SharedSlopes(CltcSampled, ImageBRDF):
     """A surface with `nodes` shared slope angles: exact images of each slope, weights of the subclass."""
 
     def __init__(self, *, nodes: int, order: int, graded: bool, bounces: BounceCount, modes: int):
@@ -129,6 +130,9 @@ class RoughSurface(SharedSlopes):
     def slope_weights(self) -> Tensor:
         return gaussian_weights(self.sigma, nodes=self.nodes)
 
+    def sampling_roughness(self) -> Tensor:
+        return equivalent_roughness(self.sigma)
+
 
 @final
 class TabulatedRoughSurface(SharedSlopes):
@@ -174,9 +178,13 @@ class TabulatedRoughSurface(SharedSlopes):
     def slope_weights(self) -> Tensor:
         return self.weights
 
+    def sampling_roughness(self) -> Tensor:
+        angle = self.weights.new_tensor(shared_slopes(self.nodes))
+        return equivalent_roughness((self.weights * angle * angle).sum(-1).sqrt())
+
 
 @final
-class ClosedFormRoughSurface(ImageBRDF):
+class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
     """Gaussian slopes over the paper's closed forms of one slope: (45) direct, (49) two bounces.
 
     Args:
@@ -200,6 +208,9 @@ class ClosedFormRoughSurface(ImageBRDF):
         self.albedo = albedo
         self.sigma = sigma
         self.nodes = nodes
+
+    def sampling_roughness(self) -> Tensor:
+        return equivalent_roughness(self.sigma)
 
     def coordinates(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return slope_plane(cosines)

@@ -1,0 +1,32 @@
+"""(27), (28) and (30) of the paper as printed, in angles."""
+
+import math
+
+import torch
+
+PI = math.pi
+NORMAL = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64)
+
+
+def by_angles(theta_i, theta_r, dphi, rho, sigma, *, m=math):
+    """(27) and (28) as printed, direct and interreflected part. `m`: math, or mpmath."""
+    alpha, beta = max(theta_i, theta_r), min(theta_i, theta_r)
+    c, s2 = m.cos(dphi), sigma**2
+    c1 = 1 - s2 / (2 * (s2 + 0.33))
+    c2 = 0.45 * s2 / (s2 + 0.09) * (m.sin(alpha) if c >= 0 else m.sin(alpha) - (2 * beta / m.pi) ** 3)
+    c3 = 0.125 * (s2 / (s2 + 0.09)) * (4 * alpha * beta / m.pi**2) ** 2
+    direct = rho / m.pi * (c1 + c * c2 * m.tan(beta) + (1 - abs(c)) * c3 * m.tan((alpha + beta) / 2))
+    bounce = 0.17 * rho**2 / m.pi * s2 / (s2 + 0.13) * (1 - c * (2 * beta / m.pi) ** 2)
+    return direct, bounce
+
+
+def qualitative_by_angles(theta_i, theta_r, dphi, rho, sigma, *, constant=0.33):
+    """(30) as printed; footnote 7 puts 0.57 in place of 0.33."""
+    a = 1 - 0.5 * sigma**2 / (sigma**2 + constant)
+    b = 0.45 * sigma**2 / (sigma**2 + 0.09)
+    alpha, beta = max(theta_i, theta_r), min(theta_i, theta_r)
+    return rho / PI * (a + b * max(0.0, math.cos(dphi)) * math.sin(alpha) * math.tan(beta))
+
+
+def direction(theta, phi=0.0):
+    return [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
