@@ -1,5 +1,6 @@
 """An anisotropic material whose grain follows one direction in space."""
 
+from dataclasses import replace
 from typing import final
 
 import torch
@@ -39,6 +40,8 @@ class Oriented(BRDF):
         return Cosines.of(normal, light, view, tangent=tangent, normalize=normalize)
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        if cosines.tangent is None:  # made without the model: by a renderer, for all models alike
+            cosines = replace(cosines, tangent=self.direction.to(cosines.light))
         return self.brdf.evaluate_components(cosines)
 
     def directional_albedo(self, cos_view: Tensor, *, nodes: int = 32) -> Tensor:
