@@ -21,6 +21,7 @@ from inverse.geometry import (
 from inverse.lights import Ambient, Disc, Distant, Environment, Point
 from inverse.maps import from_depth, from_normals
 from inverse.measured import Measurements, read_gonioreflectometer, read_merl, read_optical_constants
+from inverse.measured_fit import fit_measurements, weighted_reflectance
 from inverse.photos import Photographs, read_image, read_stack, usable, write_image, write_stack
 from inverse.profile import belly_row, cross_section, peak_position
 from inverse.radiometry import exitance, irradiance, solid_angle_of_band, solid_angle_of_cone, solid_angle_of_patch
@@ -57,6 +58,7 @@ __all__ = [
     "cylinder",
     "exitance",
     "fit",
+    "fit_measurements",
     "from_depth",
     "from_normals",
     "irradiance",
@@ -79,6 +81,7 @@ __all__ = [
     "sphere",
     "usable",
     "vase",
+    "weighted_reflectance",
     "write_image",
     "write_stack",
 ]

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from inverse.identifiability import Covariance, judge
-from inverse.levenberg import Solution, minimise
+from inverse.levenberg import Residual, Solution, minimise
 from inverse.prediction import predictor
 from inverse.result import FitResult
 from inverse.scene import Scene
@@ -66,11 +66,7 @@ def fit(
     """
     began = time.perf_counter()
     dtype = scene.surface.normals.dtype
-    if not isinstance(model, BRDF):
-        raise TypeError(f"model must be a BRDF; found {model!r}.")
-    for name, count in (("starts", starts), ("max_steps", max_steps)):
-        if not isinstance(count, int) or count < 1:
-            raise ValueError(f"{name} must be a whole number of at least 1; found {count}.")
+    check_options(model, starts, max_steps)
     photographs = checked(scene, photographs).detach().to(dtype)
     valid = usable_samples(scene, photographs, valid)
     model = copy.deepcopy(model).to(dtype)
@@ -87,22 +83,58 @@ def fit(
         raw, exposure, ambient = unknowns.unpack(shared, own)
         return (predict(raw) * exposure[:, None, None] + ambient[:, None, None] - measured) * used
 
-    shared, own = unknowns.pack()
-    channels = predict(unknowns.unpack(shared, own)[0]).shape[-1]
+    channels = predict(unknowns.unpack(*unknowns.pack())[0]).shape[-1]
     if channels not in (1, photographs.shape[-1]):
         raise ValueError(
             f"the photographs have {photographs.shape[-1]} channels, and model and lights {channels}. "
             "A per-texel albedo has shape (points, channel)."
         )
+    samples = int(used.sum()) * photographs.shape[-1]
+    return search(
+        model, unknowns, residual, samples=samples, unit="of full scale",
+        starts=starts, seed=seed, max_steps=max_steps, throw=throw, began=began,
+    )  # fmt: skip
+
+
+def search(
+    model: BRDF,
+    unknowns: Unknowns,
+    residual: Residual,
+    *,
+    samples: int,
+    unit: str,
+    starts: int,
+    seed: int,
+    max_steps: int,
+    throw: bool,
+    began: float,
+) -> FitResult:
+    """The least sum of squares of `residual` over all starts, judged; `model` receives the parameters found.
+
+    Args:
+        samples: how many of the residuals are not held at 0.
+        unit: of the residuals.
+        began: `time.perf_counter()` of the caller's start.
+    Raises: FitError when the best start diverged, unless `throw` is false.
+    """
+    shared, own = unknowns.pack()
     solutions = [
         minimise(residual, start, own, max_steps=max_steps) for start in _starts(unknowns, shared, starts, seed)
     ]
     best = min(solutions, key=lambda s: s.equations.cost if math.isfinite(s.equations.cost) else math.inf)
-    samples = int(used.sum()) * photographs.shape[-1]
-    result = _result(unknowns, best, model, samples, time.perf_counter() - began)
+    result = _result(unknowns, best, model, samples=samples, unit=unit, seconds=time.perf_counter() - began)
     if result.status == "diverged" and throw:
         raise FitError(result)
     return result
+
+
+def check_options(model: BRDF, starts: int, max_steps: int) -> None:
+    """TypeError or ValueError for what no fit can start from."""
+    if not isinstance(model, BRDF):
+        raise TypeError(f"model must be a BRDF; found {model!r}.")
+    for name, count in (("starts", starts), ("max_steps", max_steps)):
+        if not isinstance(count, int) or count < 1:
+            raise ValueError(f"{name} must be a whole number of at least 1; found {count}.")
 
 
 def checked(scene: Scene, photographs: Tensor) -> Tensor:
@@ -165,7 +197,7 @@ def _starts(unknowns: Unknowns, first: Tensor, count: int, seed: int) -> list[Te
     return found
 
 
-def _result(unknowns: Unknowns, best: Solution, model: BRDF, samples: int, seconds: float) -> FitResult:
+def _result(unknowns: Unknowns, best: Solution, model: BRDF, *, samples: int, unit: str, seconds: float) -> FitResult:
     covariance = Covariance(best.equations, best.shared.dtype)
     freedom = samples - len(best.shared) - best.own.numel()
     noise = math.sqrt(best.equations.cost / freedom) if freedom > 0 else math.inf
@@ -205,4 +237,5 @@ def _result(unknowns: Unknowns, best: Solution, model: BRDF, samples: int, secon
         seconds=seconds,
         model=model,
         history=best.history,
+        residual_unit=unit,
     )

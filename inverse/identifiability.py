@@ -64,10 +64,10 @@ def judge(unknowns: Unknowns, solution: Solution, covariance: Covariance, noise:
     for direction in covariance.blind:
         involved = [labels[k] for k in (direction.abs() > _INVOLVED).nonzero()[:, 0].tolist()]
         if len(involved) == 1 and not unknowns.own_entries:
-            return "not identified", f"{involved[0]} changes nothing in these photographs"
+            return "not identified", f"{involved[0]} changes nothing in the data"
         others = [entry.name for entry in unknowns.own_entries]
         names = " from ".join([*involved, *(f"the {name} of each texel" for name in others)])
-        return "not identified", f"these photographs cannot tell {names}"
+        return "not identified", f"the data cannot tell {names}"
     errors = covariance.shared.diagonal().sqrt() * noise
     position = 0
     verdicts = []

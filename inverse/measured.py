@@ -33,8 +33,9 @@ class Measurements:
     wavelengths: Tensor
 
     def cosines(self) -> Cosines:
-        """Cosines (sample,) of the pairs."""
-        return Cosines.of(self.light.new_tensor([0.0, 0.0, 1.0]), self.light, self.view, normalize=True)
+        """Cosines (sample,) of the pairs; the x axis is the tangent."""
+        tangent, _, normal = torch.eye(3, dtype=self.light.dtype, device=self.light.device)
+        return Cosines.of(normal, self.light, self.view, tangent=tangent, normalize=True)
 
 
 def read_gonioreflectometer(path: str | Path) -> Measurements:

@@ -94,6 +94,40 @@ def residual_figure(
     plt.close(figure)
 
 
+def measurement_figure(
+    path: Path | str, curves: dict[str, dict[str, tuple[Tensor, Tensor]]], shares: dict[str, dict[str, float]]
+) -> None:
+    """Measured and fitted reflectance along a line of directions, and what each model leaves unexplained.
+
+    Args:
+        curves: title -> label -> (viewing angle [deg], f_r [1/sr]); the first label's are drawn as dots.
+        shares: model -> material or part of it -> residual in percent.
+    """
+    figure = plt.figure(figsize=(3.6 * len(curves), 4 + 0.27 * len(shares)), layout="constrained")
+    grid = figure.add_gridspec(2, len(curves), height_ratios=(4, 0.27 * len(shares)))
+    for column, (title, lines) in enumerate(curves.items()):
+        axis = figure.add_subplot(grid[0, column])
+        for style, (label, (angle, brdf)) in zip(("k.", *_LINES), lines.items(), strict=False):
+            order = angle.argsort()
+            axis.semilogy(angle[order].numpy(), brdf[order].numpy(), style, label=label)
+        axis.set(xlabel="viewing angle [deg]", ylim=(1e-4, 100))
+        axis.set_title(title, fontsize=10)
+        axis.grid(alpha=0.3)
+    figure.axes[0].set_ylabel("f_r [1/sr]")
+    figure.axes[0].legend(fontsize=8)
+    axis = figure.add_subplot(grid[1, :])
+    table = torch.tensor([list(row.values()) for row in shares.values()])
+    axis.imshow(table.numpy(), cmap="viridis_r", vmin=0, vmax=100, aspect="auto")
+    for i, row in enumerate(table.tolist()):
+        for j, share in enumerate(row):
+            axis.text(j, i, f"{share:.0f}", ha="center", va="center", color="w" if share > 40 else "k", fontsize=9)
+    axis.set_xticks(range(table.shape[1]), list(next(iter(shares.values()))), fontsize=8)
+    axis.set_yticks(range(table.shape[0]), list(shares))
+    axis.set_title("residual rms, in percent of the rms of the data", fontsize=10)
+    figure.savefig(path, dpi=80)
+    plt.close(figure)
+
+
 def _light_angle(scene: Scene, image: int) -> Tensor:
     """Polar angle of an image's first light at each pixel (rows, columns). [deg]"""
     light = scene.lights[image][0]

@@ -14,7 +14,7 @@ from inverse.footprints import Footprints
 from inverse.lights import Ambient, Light
 from inverse.scene import Scene
 from inverse.shading import arrivals, cosines_to, received, shader
-from torchbrdf import BRDF, LinearBRDF
+from torchbrdf import BRDF, Cosines, LinearBRDF
 
 Predict = Callable[[dict[str, Tensor]], Tensor]
 
@@ -50,6 +50,24 @@ def predictor(scene: Scene, model: BRDF, pixels: Tensor, *, per_texel: bool) -> 
         compute = _linear(scene, model, pixels)
     else:
         compute = _general(scene, pixels)
+    return _of_raw(model, compute)
+
+
+def sample_predictor(cosines: Cosines, model: BRDF) -> Predict:
+    """Function from raw parameters to f_r (sample, channel) [1/sr] in single pairs of directions."""
+    if not isinstance(model, LinearBRDF):
+        return _of_raw(model, lambda m: m.evaluate(cosines))
+    with torch.no_grad():
+        basis = model.basis(cosines)[:, None, :]
+
+    def compute(model: BRDF) -> Tensor:
+        assert isinstance(model, LinearBRDF)
+        return (basis * model.coefficients()).sum(-1)
+
+    return _of_raw(model, compute)
+
+
+def _of_raw(model: BRDF, compute: Callable[[BRDF], Tensor]) -> Predict:
     call = _Call(model, compute)
 
     def predict(raw: dict[str, Tensor]) -> Tensor:

@@ -15,7 +15,7 @@ _SHOWN_EXACTLY = 1e-6
 
 @dataclass(frozen=True)
 class FitResult:
-    """Fitted parameters, how well the photographs determine them, and how the fit ended.
+    """Fitted parameters, how well the data determine them, and how the fit ended.
 
     Attributes:
         parameters: by name, in the model's own units (angles in rad); also exposure and ambient when free.
@@ -24,10 +24,11 @@ class FitResult:
         units: "rad" or "" by parameter name.
         status: converged | at bound | not identified | out of steps | diverged.
         reason: one sentence on the status.
-        residual_rms: of the used samples, in the sensor's full scale.
-        samples: number of image samples used.
+        residual_rms: of the used samples, in `residual_unit`.
+        samples: number of samples used.
         model: a fitted copy of the model.
         history: cost after each step.
+        residual_unit: "of full scale" (of the sensor) for photographs, "1/sr" for measured reflectance.
     """
 
     parameters: dict[str, Tensor]
@@ -43,6 +44,7 @@ class FitResult:
     seconds: float
     model: BRDF
     history: list[float]
+    residual_unit: str
 
     def __str__(self) -> str:
         rows = [("model", type(self.model).__name__)]
@@ -52,7 +54,7 @@ class FitResult:
             i, j = divmod(int(strongest.argmax()), len(self.names))
             if i != j:
                 rows.append(("correlation", f"{self.correlation[i, j]:+.2f} ({self.names[i]}, {self.names[j]})"))
-        rows.append(("residual rms", f"{self.residual_rms:.3g} of full scale, {self.samples} samples"))
+        rows.append(("residual rms", f"{self.residual_rms:.3g} {self.residual_unit}, {self.samples} samples"))
         rows.append(("status", f"{self.status}: {self.reason} ({self.seconds:.2f} s)"))
         width = max(14, *(len(name) + 2 for name, _ in rows))
         return "\n".join(f"{name:<{width}}{text}" for name, text in rows)

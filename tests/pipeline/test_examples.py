@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+import torchbrdf
+from torchbrdf import BRDF
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
+CORNELL = Path(__file__).parents[3] / "shared" / "data" / "cornell_brdf"
 
 
 @pytest.fixture
@@ -74,6 +78,40 @@ def test_figures_of_the_paper(run, tmp_path):
     printed = run("04_paper_figures.py", "--size", 16, "--points", 9, "--output", tmp_path).split()
     assert len(printed) == 12
     assert all(Path(name).exists() for name in printed)
+
+
+def test_gallery_shows_every_model_asked_for(run, tmp_path):
+    printed = run("05_model_gallery.py", "--size", 8, "--points", 9, "--models", 12, "--output", tmp_path).splitlines()
+    assert len(printed) == 13
+    with Image.open(tmp_path / "model_gallery.png") as picture:
+        assert picture.size[0] > 1000
+
+
+def test_gallery_leaves_no_model_out():
+    gallery = runpy.run_path(str(EXAMPLES / "05_model_gallery.py"))["MODELS"]
+    shown = {type(part).__name__ for model in gallery.values() for part in model.modules()}
+    library = {name for name in torchbrdf.__all__ if isinstance(getattr(torchbrdf, name), type)}
+    models = {name for name in library if issubclass(getattr(torchbrdf, name), BRDF)}
+    assert models - shown <= {"BRDF", "ImageBRDF", "LinearBRDF", "Mirror"}  # a mirror shows its surroundings alone
+
+
+def test_paints_are_fitted_and_called_glossy(run, tmp_path):
+    names = ("Lambert", "Lambert + GGX")
+    if not CORNELL.is_dir():
+        pytest.skip("the measured paints are not at hand")
+    printed = run("10_measured_paints.py", CORNELL, "--paints", 1, "--models", *names, "--output", tmp_path)
+    rows = {name: next(x for x in printed.splitlines() if x.startswith(f"{name:<20}")) for name in names}
+    matte, glossy = (int(row[29:].split("/")[0]) for row in rows.values())
+    assert glossy < 0.7 * matte
+    assert "acryl_blue is glossy" in printed
+    assert (tmp_path / "measured_paints.png").exists()
+
+
+def test_paints_that_are_not_there(run, tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        run("10_measured_paints.py", tmp_path)
+    assert ended.value.code == 2
+    assert f"no .brdf files in {tmp_path}" in capsys.readouterr().err
 
 
 def test_laws_catch_the_broken_brdfs_and_pass_the_corrected_one(run):

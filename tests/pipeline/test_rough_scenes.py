@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from inverse import Distant, Scene, Sensor, cuboid, fit, render, sphere
-from torchbrdf import RoughSurface, TabulatedRoughSurface, fixed, sigma_from_degrees
+from torchbrdf import Oriented, RoughSurface, TabulatedRoughSurface, UnidirectionalVCavities, fixed, sigma_from_degrees
 
 DOUBLE = torch.float64
 
@@ -50,3 +50,22 @@ def test_slope_distribution_is_recovered_without_assuming_a_gaussian():
     assert found.parameters["weights"].sum().item() == pytest.approx(1)
     assert z.abs().max() < 4
     assert found.standard_error["weights"].max() < 0.05
+
+
+def test_a_grain_is_rendered_and_read_from_photographs():
+    direction = torch.tensor([1.0, 0.02, 0.03], dtype=DOUBLE)
+    light = Distant.from_angle(40)
+    scene = Scene(sphere(16, 16, dtype=DOUBLE), [light])
+
+    def grooved(albedo, slope):
+        return Oriented(UnidirectionalVCavities(albedo=albedo, slope=slope), direction)
+
+    image = render(scene, grooved(0.7, 0.6))[0]
+    mask, normal = scene.surface.mask, scene.surface.normals[scene.surface.mask]
+    grain = direction - (normal @ direction)[:, None] * normal
+    brdf = UnidirectionalVCavities(albedo=0.7, slope=0.6)
+    toward = light.direction.to(DOUBLE)
+    values = brdf(normal, toward, torch.tensor([0.0, 0, 1], dtype=DOUBLE), tangent=grain)
+    torch.testing.assert_close(image[mask], values * (normal @ toward)[:, None])
+    found = fit(scene, image[None], grooved(0.5, 0.3))
+    assert found.parameters["brdf.slope"].item() == pytest.approx(0.6, abs=1e-5)
