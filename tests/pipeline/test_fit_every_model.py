@@ -80,4 +80,4 @@ def test_mirror_has_nothing_to_show():
     scene, photographs = photographed(Lambert(albedo=torch.tensor(0.5, dtype=DOUBLE)))
     found = fit(scene, photographs, mirror)
     assert found.status == "not identified"
-    assert found.reason == "fresnel.f0 changes nothing in these photographs"
+    assert found.reason == "fresnel.f0 changes nothing in the data"
