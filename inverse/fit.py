@@ -3,12 +3,14 @@
 import copy
 import math
 import time
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from inverse.identifiability import Covariance, judge
 from inverse.levenberg import Residual, Solution, minimise
+from inverse.plan import Plan
 from inverse.prediction import predictor
 from inverse.result import FitResult
 from inverse.scene import Scene
@@ -32,8 +34,9 @@ class FitError(RuntimeError):
 def fit(
     scene: Scene,
     photographs: Tensor,
-    model: BRDF,
+    model: BRDF | None = None,
     *,
+    plan: Plan | None = None,
     valid: Tensor | None = None,
     free_exposure: bool = False,
     free_ambient: bool = False,
@@ -51,6 +54,7 @@ def fit(
     Args:
         scene: geometry, lights, exposure and point-spread function, all taken as known.
         photographs: sensor values (image, rows, columns, channel), linear, full scale 1.
+        plan: what to simulate of the scene, and the stand-in to fit unless a model is given.
         model: start values; it is copied, not changed. Per-texel parameters have one entry for each
             masked point of the surface, in row-major order, and are fitted pixel by pixel.
         valid: samples that may be used, bool (image, rows, columns).
@@ -65,8 +69,11 @@ def fit(
         saturated, and when no sample is left; FitError.
     """
     began = time.perf_counter()
+    if plan is not None:
+        scene, stand_in = plan.applied_to(scene)
+        model = stand_in if model is None else model
     dtype = scene.surface.normals.dtype
-    check_options(model, starts, max_steps)
+    model = checked_model(model, starts, max_steps)
     photographs = checked(scene, photographs).detach().to(dtype)
     valid = usable_samples(scene, photographs, valid)
     model = copy.deepcopy(model).to(dtype)
@@ -90,10 +97,11 @@ def fit(
             "A per-texel albedo has shape (points, channel)."
         )
     samples = int(used.sum()) * photographs.shape[-1]
-    return search(
+    found = search(
         model, unknowns, residual, samples=samples, unit="of full scale",
         starts=starts, seed=seed, max_steps=max_steps, throw=throw, began=began,
     )  # fmt: skip
+    return replace(found, plan=plan)
 
 
 def search(
@@ -128,13 +136,14 @@ def search(
     return result
 
 
-def check_options(model: BRDF, starts: int, max_steps: int) -> None:
-    """TypeError or ValueError for what no fit can start from."""
+def checked_model(model: BRDF | None, starts: int, max_steps: int) -> BRDF:
+    """The model; TypeError or ValueError for what no fit can start from."""
     if not isinstance(model, BRDF):
         raise TypeError(f"model must be a BRDF; found {model!r}.")
     for name, count in (("starts", starts), ("max_steps", max_steps)):
         if not isinstance(count, int) or count < 1:
             raise ValueError(f"{name} must be a whole number of at least 1; found {count}.")
+    return model
 
 
 def checked(scene: Scene, photographs: Tensor) -> Tensor:

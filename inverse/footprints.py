@@ -20,6 +20,7 @@ class Footprints:
         weight: its share of that pixel (point,).
         resolution: rows and columns of the image.
         solid: what may hide lights from the points; None where nothing is known to.
+        partner: what sends light on to the points; None where nothing is to.
     """
 
     points: Tensor
@@ -29,6 +30,7 @@ class Footprints:
     weight: Tensor
     resolution: tuple[int, int]
     solid: Solid | None
+    partner: Solid | None = None
 
     def to_image(self, values: Tensor) -> Tensor:
         """Values (point, channel) as pixels (rows, columns, channel); 0 where no point lies.

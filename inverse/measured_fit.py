@@ -7,7 +7,7 @@ import time
 import torch
 from torch import Tensor
 
-from inverse.fit import check_options, search
+from inverse.fit import checked_model, search
 from inverse.measured import Measurements
 from inverse.prediction import sample_predictor
 from inverse.result import FitResult
@@ -44,7 +44,7 @@ def fit_measurements(
         that is not positive, and when no sample is above the horizon; FitError.
     """
     began = time.perf_counter()
-    check_options(model, starts, max_steps)
+    checked_model(model, starts, max_steps)
     if not knee > 0:
         raise ValueError(f"knee must be above 0 1/sr; found {knee}.")
     values = measurements.values

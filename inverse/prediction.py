@@ -12,8 +12,9 @@ from torch import Tensor, nn
 
 from inverse.footprints import Footprints
 from inverse.lights import Ambient, Light
+from inverse.radiosity import bounced
 from inverse.scene import Scene
-from inverse.shading import arrivals, cosines_to, received, shader
+from inverse.shading import arrivals, cosines_to, passed_on, received, shader
 from torchbrdf import BRDF, Cosines, LinearBRDF
 
 Predict = Callable[[dict[str, Tensor]], Tensor]
@@ -50,6 +51,8 @@ def predictor(scene: Scene, model: BRDF, pixels: Tensor, *, per_texel: bool) -> 
         compute = _linear(scene, model, pixels)
     else:
         compute = _general(scene, pixels)
+    if scene.between_parts:
+        return _of_raw(model, _with_exchange(scene, pixels, compute))
     return _of_raw(model, compute)
 
 
@@ -99,6 +102,25 @@ def _linear(scene: Scene, model: LinearBRDF, pixels: Tensor) -> Callable[[BRDF],
         if coefficients.ndim > 2 and inside is not None:
             coefficients = coefficients[inside]
         return (basis * coefficients).sum(-1)
+
+    return compute
+
+
+def _with_exchange(scene: Scene, pixels: Tensor, alone: Callable[[BRDF], Tensor]) -> Callable[[BRDF], Tensor]:
+    """Adds what the parts of the solid send on to each other: per image, irradiances recorded once."""
+    where = scene.footprints()
+    assert where.partner is not None
+    recorded = []
+    with torch.no_grad():
+        for lights in scene.lights:
+            images = bounced(where.partner, lights, where.points, where.normals)  # (bounce, point, channel)
+            row = images.movedim(0, 1).flatten(1)
+            kept = _recorded(scene, where, row, pixels).unflatten(1, (len(images), -1))
+            recorded.append(kept.movedim(1, 0))
+
+    def compute(model: BRDF) -> Tensor:
+        passed = [passed_on(model, images) for images in recorded]
+        return alone(model) + torch.stack(torch.broadcast_tensors(*passed))
 
     return compute
 

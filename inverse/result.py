@@ -7,6 +7,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from inverse.plan import Plan
 from torchbrdf import BRDF
 
 # Errors smaller than this, relative to the value, are printed as powers of ten.
@@ -28,6 +29,7 @@ class FitResult:
         samples: number of samples used.
         model: a fitted copy of the model.
         history: cost after each step.
+        plan: what was simulated and what was not, where a plan said so.
         residual_unit: "of full scale" (of the sensor) for photographs, "1/sr" for measured reflectance.
     """
 
@@ -45,6 +47,7 @@ class FitResult:
     model: BRDF
     history: list[float]
     residual_unit: str
+    plan: Plan | None = None
 
     def __str__(self) -> str:
         rows = [("model", type(self.model).__name__)]

@@ -56,8 +56,10 @@ class Scene:
 
     def footprints(self) -> Footprints:
         """The points to shade, and the pixels they make up."""
-        surface = self.surface if self.shadows else replace(self.surface, solid=None)
-        return footprints(surface, self.detail)
+        found, solid = footprints(self.surface, self.detail), self.surface.solid
+        return replace(
+            found, solid=solid if self.shadows else None, partner=solid if self.between_parts else None
+        )
 
     @property
     def images(self) -> int:

@@ -1,5 +1,6 @@
 """Radiance of a surface under lights. The only place where the cosine of the light enters."""
 
+import math
 from collections.abc import Callable, Iterator
 
 import torch
@@ -8,11 +9,15 @@ from torch import Tensor
 
 from inverse.footprints import Footprints
 from inverse.lights import Ambient, Arrival, Directional, Disc, Environment, Light
+from inverse.plan import Plan
+from inverse.radiosity import bounced, sky_share
 from inverse.scene import Scene
+from inverse.visibility import distance_to, shadowless, unshadowed
 from torchbrdf import BRDF, Cosines, is_per_texel
 
 _AMBIENT_TABLE = 24
 _TEXEL_NODES = 16
+_ALBEDO_NODES = 12
 
 
 def cosines_to(arrival: Arrival, where: Footprints) -> Cosines:
@@ -26,8 +31,15 @@ def received(cosines: Cosines, arrival: Arrival) -> Tensor:
 
 
 def arrivals(light: Directional, where: Footprints) -> Iterator[Arrival]:
-    """The directions from which a light reaches the points, less what the solid hides."""
-    return light.arrivals(where.points)
+    """The directions from which a light reaches the points, with no irradiance where the solid hides it."""
+    hides = where.solid is not None and shadowless(where.solid, light) is None
+    for arrival in light.arrivals(where.points):
+        if not hides:
+            yield arrival
+            continue
+        far = distance_to(light, where.points)
+        clear = unshadowed(where.solid, where.points, where.normals, arrival.direction, far)
+        yield arrival._replace(irradiance=arrival.irradiance * clear[:, None])
 
 
 def extended_reflected(model: BRDF, where: Footprints, light: Disc | Environment) -> Tensor:
@@ -68,7 +80,8 @@ def shader(where: Footprints, light: Light) -> Callable[[BRDF], Tensor]:
     The geometry of a light with one direction is done once; of more there would be too much to keep.
     """
     if isinstance(light, Ambient):
-        return lambda model: ambient_reflected(model, where, light)
+        sky = None if where.partner is None else sky_share(where.partner, where.points, where.normals)[:, None]
+        return lambda model: ambient_reflected(model, where, light) * (1 if sky is None else sky)
     if isinstance(light, Disc | Environment):
         return lambda model: extended_reflected(model, where, light)
     arrival = next(arrivals(light, where))
@@ -76,17 +89,54 @@ def shader(where: Footprints, light: Light) -> Callable[[BRDF], Tensor]:
     return lambda model: model.evaluate(cosines) * received(cosines, arrival)
 
 
+def exchanged(where: Footprints, lights: tuple[Light, ...]) -> Callable[[BRDF], Tensor]:
+    """Function from a model to the radiance (point, channel) that parts of the solid send on to each other.
+
+    Diffuse: the parts, and the point for this light, scatter as Lambert surfaces of the model's white-sky albedo.
+    """
+    assert where.partner is not None
+    images = bounced(where.partner, lights, where.points, where.normals)
+    return lambda model: passed_on(model, images)
+
+
+def passed_on(model: BRDF, images: Tensor) -> Tensor:
+    """sum_b rho^(b + 1) T_b/pi (point, channel) of irradiances T_b (bounce, point, channel) among white parts."""
+    if is_per_texel(model):
+        raise ValueError("light between parts needs one material: the model has parameters per texel.")
+    rho = white_sky_albedo(model, images)
+    total, power = torch.zeros_like(images[0]), rho
+    for image in images:
+        power = power * rho
+        total = total + power / math.pi * image
+    return total
+
+
+def white_sky_albedo(model: BRDF, like: Tensor) -> Tensor:
+    """Share of uniform light that is reflected: 2 int E(mu) mu dmu (channel,), in the dtype of `like`. [-]"""
+    nodes, weights = (like.new_tensor(k) for k in leggauss(_ALBEDO_NODES))
+    cosines = (1 + nodes) / 2
+    return (model.directional_albedo(cosines) * (cosines * weights)[:, None]).sum(0)
+
+
 def radiance(model: BRDF, where: Footprints, lights: tuple[Light, ...]) -> Tensor:
     """Radiance (point, channel) at the points under all the lights of one image.
 
     Per-texel parameters of the model run over the points.
     """
-    first, *others = (shader(where, light)(model) for light in lights)
+    parts = [shader(where, light) for light in lights]
+    if where.partner is not None:
+        parts.append(exchanged(where, lights))
+    first, *others = (part(model) for part in parts)
     return sum(others, first)
 
 
-def render(scene: Scene, model: BRDF) -> Tensor:
-    """Radiance images (image, rows, columns, channel), averaged over each pixel, before the sensor."""
+def render(scene: Scene, model: BRDF | Plan) -> Tensor:
+    """Radiance images (image, rows, columns, channel), averaged over each pixel, before the sensor.
+
+    Simulates what the scene has switched on, or what a plan keeps. ValueError for the plan of another scene.
+    """
+    if isinstance(model, Plan):
+        scene, model = model.applied_to(scene)
     where = scene.footprints()
     images = [where.to_image(radiance(model, where, lights)) for lights in scene.lights]
     return torch.stack(torch.broadcast_tensors(*images))

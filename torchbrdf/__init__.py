@@ -20,6 +20,7 @@ from torchbrdf.directions import (
     Cosines,
 )
 from torchbrdf.effects import (
+    EFFECTS,
     Option,
     compact,
     options,
@@ -162,6 +163,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Coupled",
     "Dampened",
     "Dielectric",
+    "EFFECTS",
     "EON",
     "FastRoughSurface",
     "Fresnel",

@@ -31,6 +31,9 @@ EXACT_SLOPES = "exact integral over slopes"
 MANY_SLOPES = "all slopes of the model"
 FRESNEL_VARIATION = "Fresnel variation"
 ANISOTROPY = "anisotropy"
+EFFECTS = (
+    ROUGHNESS, INTERREFLECTION, LATER_BOUNCES, C3_TERM, EXACT_SLOPES, MANY_SLOPES, FRESNEL_VARIATION, ANISOTROPY,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,70 @@
+"""A stratified sample of a scene's own pixels, on which effects are measured."""
+
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from inverse.geometry import pixel_average
+from inverse.lights import Distant, Point
+from inverse.scene import Scene
+from inverse.simplify import changed
+from inverse.visibility import distance_to, shadowless, unshadowed
+
+# Bins of a polar angle, from along the axis to perpendicular, and beyond.
+_VIEW_BINS, _LIGHT_BINS = 6, 9
+# Only so many lights are told apart.
+_LIGHTS = 3
+
+
+def pilot(scene: Scene, count: int, seed: int) -> tuple[Scene, Tensor]:
+    """A scene that shows about `count` of the object's pixels, and which they are (rows, columns).
+
+    The pixels are drawn evenly from strata of incidence for each light, of obliqueness to the view, of cast
+    shadow, of the side of the object, and of full or partial coverage: what effects depend on.
+    """
+    surface = scene.surface
+    strata, shown = _strata(scene)
+    generator = torch.Generator().manual_seed(seed)
+    order = torch.randperm(int(shown.sum()), generator=generator)
+    _, stratum, sizes = torch.unique(strata[shown][order], return_inverse=True, return_counts=True)
+    # the n-th of each stratum comes before the n+1-th of any
+    by_stratum = stratum.argsort(stable=True)
+    rank = torch.empty_like(by_stratum)
+    rank[by_stratum] = torch.cat([torch.arange(int(k)) for k in sizes])
+    chosen = torch.zeros(int(shown.sum()), dtype=torch.bool)
+    chosen[order[rank.argsort(stable=True)[:count]]] = True
+    pixels = torch.zeros_like(shown).masked_scatter(shown, chosen)
+    fine = pixels.repeat_interleave(surface.samples, 0).repeat_interleave(surface.samples, 1)
+    return changed(scene, surface=replace(surface, mask=surface.mask & fine)), pixels
+
+
+def _strata(scene: Scene) -> tuple[Tensor, Tensor]:
+    """A number for each pixel's stratum, and the pixels that show the object, both (rows, columns)."""
+    surface, s = scene.surface, scene.surface.samples
+    coverage = surface.coverage()
+    shown = coverage > 0
+    share = surface.mask.to(surface.normals.dtype)[..., None]
+
+    def mean(field: Tensor) -> Tensor:
+        total = pixel_average(torch.where(surface.mask[..., None], field, 0 * field) * share, s)[shown]
+        return total / coverage[shown][:, None]
+
+    points, normals = mean(surface.points), torch.nn.functional.normalize(mean(surface.normals), dim=-1)
+    view = surface.view if surface.view.ndim == 1 else mean(surface.view)
+    number = _bin((normals * view).sum(-1), _VIEW_BINS) * 2 + (coverage[shown] == 1)
+    number = number * 4 + 2 * (normals[:, 0] > 0) + (normals[:, 1] > 0)
+    lights = [k for entry in scene.lights for k in entry if isinstance(k, Distant | Point)]
+    for light in lights[:_LIGHTS]:
+        direction = next(light.arrivals(points)).direction
+        number = number * (_LIGHT_BINS + 1) + _bin((normals * direction).sum(-1), _LIGHT_BINS)
+        if surface.solid is not None and shadowless(surface.solid, light) is None:
+            lit = unshadowed(surface.solid, points, normals, direction, distance_to(light, points))
+            number = number * 2 + lit
+    return torch.zeros_like(shown, dtype=torch.long).masked_scatter(shown, number.long()), shown
+
+
+def _bin(cosine: Tensor, bins: int) -> Tensor:
+    """Number of the polar angle's bin; `bins` below the horizon."""
+    angle = torch.rad2deg(torch.acos(cosine.clamp(-1, 1)))
+    return (angle * bins / 90).long().clamp(max=bins)

@@ -1,0 +1,186 @@
+"""Which effects a scene calls for, measured on a sample of its own pixels."""
+
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from inverse.detail import details
+from inverse.measure import RadianceDifference, SigmaBias
+from inverse.pilot import pilot
+from inverse.plan import Effect, Plan
+from inverse.scene import Scene
+from inverse.shading import render
+from inverse.simplify import FOOTPRINT, SCENE_EFFECTS, changed, everything, simpler
+from torchbrdf import BRDF, EFFECTS, compact, is_per_texel, options, simulated
+
+
+def plan(
+    scene: Scene,
+    model: BRDF,
+    tolerance: float,
+    *,
+    of: str = "radiance",
+    safety: float = 2.0,
+    pixels: int = 400,
+    seed: int = 0,
+) -> Plan:
+    """What to simulate of a scene and a material so that the result changes by less than a tolerance.
+
+    What geometry rules out costs nothing. Everything else is tried on a stratified sample of the scene's pixels: each
+    effect left out alone, which gives its size, and then together, from the largest saving to the smallest and for the
+    material from the cheapest rung upward, as long as all that is left out, times `safety`, stays within the tolerance.
+
+    Args:
+        scene: geometry, lights and camera; which effects it has switched on does not matter.
+        model: the material at about the values it will have. Parameters per texel are refused.
+        tolerance: of="radiance": of any pixel, as a share of the peak radiance. of="sigma": of the sigma that a fit
+            finds, as a share of its standard error.
+        safety: factor between what the sample shows and what is promised.
+        pixels: size of the sample.
+        seed: of the sample.
+    Returns: Plan, for `render(scene, plan)` and `fit(scene, photographs, plan=plan)`.
+    Raises: ValueError outside these domains, for a scene without light, and of="sigma" without noise or sigma.
+    """
+    _check(tolerance, of, safety, pixels, model)
+    full = everything(scene)
+    sample, chosen = pilot(full, pixels, seed)
+    watch = _Watch(sample, model, chosen)
+    reference = watch.values(sample, model)
+    if of == "radiance":
+        measure = RadianceDifference(reference, tolerance)
+    else:
+        measure = SigmaBias(reference, tolerance, sample, model, chosen, int((full.surface.coverage() > 0).sum()))
+    budget = measure.limit / safety
+
+    absent: dict[str, str] = {}
+    alone: dict[str, _Alone] = {}
+    present = []
+    for entry in simpler(full):
+        if entry.absent is not None:
+            absent[entry.effect] = entry.absent
+            continue
+        alone[entry.effect] = watch.alone(measure, entry.choice, entry.apply(sample), model)
+        present.append(entry)
+    for option in (k for group in options(model).values() for k in group):
+        found = watch.alone(measure, option.choice, sample, option.model)
+        for name in option.skips:
+            if name not in alone or found.size < alone[name].size:
+                alone[name] = found
+
+    def error(scene: Scene, model: BRDF) -> float:
+        return measure.size(watch.values(scene, model), scene, model)
+
+    stand_in, skipped = _cheapest_material(model, lambda k: error(sample, k) <= budget)
+    left = full
+    for entry in sorted(present, key=lambda k: -alone[k.effect].saved):
+        if entry.effect == FOOTPRINT:
+            continue
+        if error(entry.apply(sample), stand_in) <= budget:
+            sample, left = entry.apply(sample), entry.apply(left)
+            skipped[entry.effect] = entry.choice
+    if FOOTPRINT in alone:
+        for share, detail in details(left):
+            finer = changed(sample, detail=detail)
+            if error(finer, stand_in) <= budget:
+                sample, left = finer, changed(left, detail=detail)
+                skipped[FOOTPRINT] = f"one sample in {share:.0%} of the pixels, where the radiance hardly varies"
+                break
+    rows = [_row(name, alone, absent, skipped) for name in (*SCENE_EFFECTS, *simulated(model))]
+    return Plan(
+        scene=left, model=compact(stand_in), effects=(*rows, *_others(full, model)), of=of, tolerance=tolerance,
+        limit=measure.limit, error=error(sample, stand_in), safety=safety, pilot=int(chosen.sum()),
+    )  # fmt: skip
+
+
+class _Alone(NamedTuple):
+    """What leaving out one effect alone does: its size, the share of time it saves, what is done instead."""
+
+    size: float
+    saved: float
+    choice: str
+
+
+class _Watch:
+    """Renders the pilot, and knows how long the reference took."""
+
+    def __init__(self, sample: Scene, model: BRDF, pixels: Tensor):
+        self.pixels = pixels
+        self.values(sample, model)
+        self.seconds = self._timed(sample, model)[1]
+
+    def values(self, scene: Scene, model: BRDF) -> Tensor:
+        """Radiance (image, pixel, channel)."""
+        with torch.no_grad():
+            return render(scene, model)[:, self.pixels]
+
+    def alone(self, measure: RadianceDifference | SigmaBias, choice: str, scene: Scene, model: BRDF) -> _Alone:
+        """A simpler simulation against the reference."""
+        values, seconds = self._timed(scene, model)
+        return _Alone(measure.size(values, scene, model), max(0.0, 1 - seconds / self.seconds), choice)
+
+    def _timed(self, scene: Scene, model: BRDF) -> tuple[Tensor, float]:
+        began = time.perf_counter()
+        values = self.values(scene, model)
+        return values, time.perf_counter() - began
+
+
+def _cheapest_material(model: BRDF, close: Callable[[BRDF], bool]) -> tuple[BRDF, dict[str, str]]:
+    """The first option of each group that stays close, on top of those taken before; parts are dropped last."""
+    skipped: dict[str, str] = {}
+    tried: set[str] = set()
+    while True:
+        groups = [name for name in options(model) if name not in tried]
+        if not groups:
+            return model, skipped
+        group = min(groups, key=lambda name: name.startswith("part"))
+        tried.add(group)
+        for option in options(model)[group]:
+            if close(option.model):
+                model = option.model
+                skipped |= dict.fromkeys(option.skips, option.choice)
+                break
+
+
+def _row(name: str, alone: dict[str, _Alone], absent: dict[str, str], skipped: dict[str, str]) -> Effect:
+    if name in absent:
+        return Effect(name, None if absent[name].startswith("unknown") else 0.0, False, absent[name])
+    found = alone[name]
+    if name in skipped:
+        return Effect(name, found.size, False, f"small enough; instead: {skipped[name]}", found.saved)
+    return Effect(name, found.size, True, f"needed; not close enough: {found.choice}", found.saved)
+
+
+def _others(scene: Scene, model: BRDF) -> list[Effect]:
+    """Effects that are never traded: named, so that nothing is left out silently."""
+    sensor, known = scene.sensor, simulated(model)
+    rows = [
+        Effect("attached shadow", None, True, "the light's cosine: costs nothing"),
+        Effect("point-spread function", None, sensor.psf_sigma > 0, "the sensor's; expose and fit apply it"),
+        Effect("noise", None, sensor.read_noise > 0 or sensor.full_well is not None, "the sensor's; expose adds it"),
+        Effect("quantisation", None, sensor.bits is not None, "the sensor's; expose rounds"),
+        Effect("polarisation", None, False, "the light is unpolarised, and so the camera takes it to be"),
+    ]
+    kind = type(model).__name__
+    rows += [
+        Effect(name, None, False, f"nothing of it that {kind} could leave out")
+        for name in EFFECTS
+        if not any(k == name or k.startswith(f"{name} of ") for k in known)
+    ]
+    return rows
+
+
+def _check(tolerance: float, of: str, safety: float, pixels: int, model: BRDF) -> None:
+    if of not in ("radiance", "sigma"):
+        raise ValueError(f'plan: of must be "radiance" or "sigma"; found {of!r}.')
+    if not tolerance > 0:
+        unit = "share of the peak radiance" if of == "radiance" else "share of sigma's standard error"
+        raise ValueError(f"plan: tolerance must be positive [{unit}]; found {tolerance}.")
+    if not safety >= 1:
+        raise ValueError(f"plan: safety must be at least 1; found {safety}.")
+    if not isinstance(pixels, int) or pixels < 1:
+        raise ValueError(f"plan: pixels must be a whole number of at least 1; found {pixels}.")
+    if is_per_texel(model):
+        raise ValueError("plan: the model has parameters per texel; plan with one typical material instead.")
