@@ -39,7 +39,9 @@ class SigmaBias:
         well = 0.0 if sensor.full_well is None else float(reference.mean()) / (sensor.exposure * sensor.full_well)
         noise = math.sqrt((sensor.read_noise / sensor.exposure) ** 2 + well)
         if not noise > 0:
-            raise ValueError("plan(of='sigma') measures against the standard error of sigma: give the sensor its noise.")
+            raise ValueError(
+                "plan(of='sigma') measures against the standard error of sigma: give the sensor its noise."
+            )
         derivative, names, scale = self._derivative(scene, model)
         if not names:
             raise ValueError(f"plan(of='sigma') needs a model with a trained sigma; found {type(model).__name__}.")

@@ -57,9 +57,7 @@ class Scene:
     def footprints(self) -> Footprints:
         """The points to shade, and the pixels they make up."""
         found, solid = footprints(self.surface, self.detail), self.surface.solid
-        return replace(
-            found, solid=solid if self.shadows else None, partner=solid if self.between_parts else None
-        )
+        return replace(found, solid=solid if self.shadows else None, partner=solid if self.between_parts else None)
 
     @property
     def images(self) -> int:
