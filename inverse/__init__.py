@@ -29,7 +29,8 @@ from inverse.result import FitResult
 from inverse.scene import Scene
 from inverse.sensor import Sensor
 from inverse.shading import render
-from inverse.solids import Cuboid, Cylinder, Group, Plane, Revolution, Solid, Sphere
+from inverse.solids import Cuboid, Cylinder, Group, Plane, Solid, Sphere
+from inverse.turned import Revolution
 
 __all__ = [
     "Ambient",

@@ -14,7 +14,8 @@ import torch
 from scipy.interpolate import CubicSpline
 from torch import Tensor
 
-from inverse.solids import Cuboid, Cylinder, Plane, Revolution, Solid, Sphere
+from inverse.solids import Cuboid, Cylinder, Plane, Solid, Sphere
+from inverse.turned import Revolution
 
 TO_CAMERA = (0.0, 0.0, 1.0)
 # Heights and radii of the default vase: foot, waist, belly, shoulder, neck, lip.

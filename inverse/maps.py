@@ -7,6 +7,7 @@ from torch import Tensor
 from torch.nn.functional import max_pool2d
 
 from inverse.geometry import TO_CAMERA, Surface, unit_surface
+from inverse.relief import HeightField
 
 
 def from_normals(normals: Tensor, mask: Tensor | None = None) -> Surface:
@@ -40,7 +41,9 @@ def from_depth(depth: Tensor, camera_matrix: Tensor | None = None, mask: Tensor 
         depth: in pixel widths for the orthographic view; in any length with a camera matrix.
         camera_matrix: pinhole intrinsics (3, 3) in pixels, y down as in kornia; None is orthographic.
         mask: where the object is; without it, where depth is finite and positive.
-    The rim, where a neighbour is missing, is left out of the mask: its normal would mix two surfaces.
+    The rim, where a neighbour is missing, is left out of the mask: its normal would mix two surfaces. The
+    orthographic surface knows its solid, the visible relief; the perspective one does not, so that nothing is
+    known of the shadows on it.
     """
     if depth.ndim != 2:
         raise ValueError(f"depth must have shape (rows, columns); found {tuple(depth.shape)}.")
@@ -55,7 +58,9 @@ def from_depth(depth: Tensor, camera_matrix: Tensor | None = None, mask: Tensor 
         # rows run downwards, so d(depth)/dy = -gradient[1]; z = -depth
         normals = torch.stack((gradient[0], -gradient[1], torch.ones_like(depth)), -1)
         flat = from_normals(normals, interior)
-        return unit_surface(torch.cat((flat.points[..., :2], -filled[0, 0, :, :, None]), -1), normals, interior)
+        points = torch.cat((flat.points[..., :2], -filled[0, 0, :, :, None]), -1)
+        relief = HeightField(torch.where(object_, -depth, torch.nan))
+        return unit_surface(points, normals, interior, solid=relief)
     flip = depth.new_tensor([1.0, -1.0, -1.0])  # kornia: y down, z into the scene, normals away from the camera
     normals = -depth_to_normals(filled, camera_matrix[None].to(depth.dtype))[0].permute(1, 2, 0) * flip
     points = depth_to_3d_v2(filled[0], camera_matrix[None].to(depth.dtype))[0] * flip

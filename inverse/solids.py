@@ -6,11 +6,16 @@ Cameras see them and lights are blocked by them, so every question is a ray's. F
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
+
+from inverse.patches import Patches, disc, joined, middles, spiral
+
+# How far a plane takes part in the light between it and what stands on it, in half sizes of that. A wall one half
+# size above the plane loses the strip of it below the horizon: 2/(1000 pi) of its sky.
+_FAR = 1000.0
 
 
 class Solid(ABC):
@@ -25,6 +30,14 @@ class Solid(ABC):
     @abstractmethod
     def meet(self, origin: Tensor, direction: Tensor) -> tuple[Tensor, Tensor]:
         """`hit`, and the unit vectors (..., 3) that leave the solid there (arbitrary where the ray misses)."""
+
+    def blocks(self, origin: Tensor, direction: Tensor, reach: Tensor | float = math.inf) -> Tensor:
+        """True (...) where a ray from outside meets the solid at a distance below `reach` (...)."""
+        return self.hit(origin, direction) < reach
+
+    def patches(self, count: int) -> Patches:
+        """The whole surface in about `count` pieces, float64. ValueError for a solid whose extent is unknown."""
+        raise ValueError(f"{type(self).__name__} has no patches: it has no end, or its back is unknown.")
 
 
 class Body(Solid):
@@ -53,14 +66,19 @@ class Sphere(Body):
             raise ValueError(f"Sphere.radius must be positive and finite; found {self.radius}.")
 
     def hit(self, origin: Tensor, direction: Tensor) -> Tensor:
-        start, along = origin.double() - _row(self.centre, origin), direction.double()
+        start, along = origin.double() - row(self.centre, origin), direction.double()
         middle = -(start * along).sum(-1)
         beside = start + middle[..., None] * along  # the ray's point nearest to the centre
         entry = middle - (self.radius**2 - (beside * beside).sum(-1)).sqrt()  # NaN where the ray passes by
         return torch.where(entry > 0, entry, torch.inf)
 
     def normal(self, points: Tensor) -> Tensor:
-        return (points - _row(self.centre, points)) / self.radius
+        return (points - row(self.centre, points)) / self.radius
+
+    def patches(self, count: int) -> Patches:
+        normals = spiral(count)
+        areas = torch.full_like(normals[:, 0], 4 * math.pi * self.radius**2 / count)
+        return Patches(row(self.centre, normals) + self.radius * normals, normals, areas)
 
 
 @dataclass(frozen=True)
@@ -78,7 +96,7 @@ class Cylinder(Body):
             )
 
     def hit(self, origin: Tensor, direction: Tensor) -> Tensor:
-        start, along = (k.double() * _row((1.0, 0.0, 1.0), k) for k in (origin, direction))
+        start, along = (k.double() * row((1.0, 0.0, 1.0), k) for k in (origin, direction))
         squared = (along * along).sum(-1)
         upright = squared == 0
         squared = squared.masked_fill(upright, 1.0)
@@ -86,7 +104,7 @@ class Cylinder(Body):
         beside = start + middle[..., None] * along
         room = self.radius**2 - (beside * beside).sum(-1)
         half = torch.where(upright & (room > 0), torch.inf, (room / squared).sqrt())  # NaN where the ray passes by
-        enter, leave = _slab(origin.double()[..., 1], direction.double()[..., 1], self.half_height)
+        enter, leave = slab(origin.double()[..., 1], direction.double()[..., 1], self.half_height)
         enter, leave = torch.maximum(enter, middle - half), torch.minimum(leave, middle + half)
         return torch.where((enter > 0) & (enter < leave), enter, torch.inf)
 
@@ -96,6 +114,20 @@ class Cylinder(Body):
         cap = torch.stack((0 * x, y.sign(), 0 * z), -1)
         on_wall = (torch.hypot(x, z) - self.radius).abs() <= (y.abs() - self.half_height).abs()
         return torch.where(on_wall[..., None], around / around.norm(dim=-1, keepdim=True), cap)
+
+    def patches(self, count: int) -> Patches:
+        wall, cap = 4 * math.pi * self.radius * self.half_height, math.pi * self.radius**2
+        side = math.sqrt((wall + 2 * cap) / count)
+        columns, rows = math.ceil(2 * math.pi * self.radius / side), math.ceil(2 * self.half_height / side)
+        turn, level = torch.meshgrid(middles(columns, math.pi), middles(rows, self.half_height), indexing="ij")
+        around = torch.stack((turn.sin(), 0 * turn, turn.cos()), -1).flatten(0, 1)
+        on_wall = self.radius * around + level.flatten()[:, None] * row((0.0, 1.0, 0.0), around)
+        x, z, areas = disc(math.ceil(cap / side**2), self.radius)
+        pieces = [Patches(on_wall, around, torch.full_like(on_wall[:, 0], wall / (columns * rows)))]
+        for sign in (-1.0, 1.0):
+            points = torch.stack((x, torch.full_like(x, sign * self.half_height), z), -1)
+            pieces.append(Patches(points, row((0.0, sign, 0.0), x).expand(points.shape), areas))
+        return joined(pieces)
 
 
 @dataclass(frozen=True)
@@ -113,13 +145,25 @@ class Plane(Body):
         object.__setattr__(self, "normal_vector", tuple(k / length for k in self.normal_vector))
 
     def hit(self, origin: Tensor, direction: Tensor) -> Tensor:
-        normal = _row(self.normal_vector, origin)
-        height = ((origin.double() - _row(self.point, origin)) * normal).sum(-1)
+        normal = row(self.normal_vector, origin)
+        height = ((origin.double() - row(self.point, origin)) * normal).sum(-1)
         falling = -(direction.double() * normal).sum(-1)
         return torch.where((height > 0) & (falling > 0), height / falling, torch.inf)
 
     def normal(self, points: Tensor) -> Tensor:
-        return _row(self.normal_vector, points).to(points.dtype).expand(points.shape)
+        return row(self.normal_vector, points).to(points.dtype).expand(points.shape)
+
+    def patches_below(self, points: Tensor, count: int) -> Patches:
+        """The part of the plane near bodies at points (point, 3): a disc of 1000 half sizes, finest in the middle."""
+        normal = row(self.normal_vector, points)
+        centre = (points.amin(0) + points.amax(0)) / 2
+        size = (points - centre).norm(dim=-1).max()
+        centre = centre - ((centre - row(self.point, points)) @ normal) * normal
+        across = torch.linalg.cross(normal, torch.eye(3, dtype=torch.float64)[normal.abs().argmin()])
+        across = across / across.norm()
+        u, v, areas = disc(count, _FAR, core=1.0)
+        offsets = u[:, None] * across + v[:, None] * torch.linalg.cross(normal, across)
+        return Patches(centre + size * offsets, normal.expand(count, 3), size**2 * areas)
 
 
 @dataclass(frozen=True)
@@ -140,101 +184,37 @@ class Cuboid(Body):
 
     def hit(self, origin: Tensor, direction: Tensor) -> Tensor:
         axes = self._axes(origin)
-        enter, leave = _box(origin.double() @ axes, direction.double() @ axes, _row(self.half_sizes, origin))
+        enter, leave = box(origin.double() @ axes, direction.double() @ axes, row(self.half_sizes, origin))
         return torch.where((enter > 0) & (enter < leave), enter, torch.inf)
 
     def normal(self, points: Tensor) -> Tensor:
         axes = self._axes(points)
         own = points.double() @ axes
-        face = (own.abs() - _row(self.half_sizes, points)).argmax(-1)
+        face = (own.abs() - row(self.half_sizes, points)).argmax(-1)
         outward = torch.nn.functional.one_hot(face, 3) * own.sign()
         return (outward @ axes.T).to(points.dtype)
+
+    def patches(self, count: int) -> Patches:
+        sizes, axes = self.half_sizes, self._axes(torch.empty(0))
+        side = math.sqrt(8 * (sizes[0] * sizes[1] + sizes[1] * sizes[2] + sizes[2] * sizes[0]) / count)
+        pieces = []
+        for face in range(3):
+            one, other = (face + 1) % 3, (face + 2) % 3
+            u, v = (middles(math.ceil(2 * sizes[k] / side), sizes[k]) for k in (one, other))
+            area = 4 * sizes[one] * sizes[other] / (len(u) * len(v))
+            for sign in (-1.0, 1.0):
+                own = torch.zeros(len(u), len(v), 3, dtype=torch.float64)
+                own[..., face], own[..., one], own[..., other] = sign * sizes[face], u[:, None], v
+                points = own.flatten(0, 1) @ axes.T
+                pieces.append(Patches(points, (sign * axes[:, face]).expand(points.shape), 0 * points[:, 0] + area))
+        return joined(pieces)
 
     def _axes(self, like: Tensor) -> Tensor:
         """Columns: the box's axes in the image frame."""
         a, b = math.radians(self.yaw), math.radians(self.pitch)
         about_y = [[math.cos(a), 0.0, math.sin(a)], [0.0, 1.0, 0.0], [-math.sin(a), 0.0, math.cos(a)]]
         about_x = [[1.0, 0.0, 0.0], [0.0, math.cos(b), -math.sin(b)], [0.0, math.sin(b), math.cos(b)]]
-        return _row(about_x, like) @ _row(about_y, like)
-
-
-@dataclass(frozen=True)
-class Revolution(Body):
-    """Solid of revolution about the y axis, closed by discs at both ends.
-
-    Attributes:
-        radius: r(y) for a NumPy array of heights in [low, high], positive inside.
-        slope: its derivative dr/dy.
-        low, high: the heights of the ends.
-        steps: points tried along the part of a ray inside the surrounding box; a ray that dips into
-            the solid between two of them passes.
-        convex: say True where the profile is concave, to save the search for shadows.
-    """
-
-    radius: Callable
-    slope: Callable
-    low: float
-    high: float
-    steps: int = 256
-    convex: bool = False
-
-    def inside(self, points: Tensor) -> Tensor:
-        """r(y)^2 - x^2 - z^2 (...) of float64 points: positive inside, between the ends."""
-        x, y, z = points.unbind(-1)
-        clipped = y.clamp(self.low, self.high).cpu().numpy()
-        r = torch.as_tensor(self.radius(clipped)).to(points)
-        return r * r - x * x - z * z
-
-    def widest(self) -> float:
-        """A radius that no height exceeds by more than the steps can tell."""
-        heights = torch.linspace(self.low, self.high, 4 * self.steps, dtype=torch.float64)
-        return float(torch.as_tensor(self.radius(heights.numpy())).max())
-
-    def hit(self, origin: Tensor, direction: Tensor) -> Tensor:
-        origin, direction = torch.broadcast_tensors(origin.double(), direction.double())
-        flat = [k.reshape(-1, 3) for k in (origin, direction)]
-        found = [self._march(*piece) for piece in zip(*(k.split(1 << 14) for k in flat), strict=True)]
-        return torch.cat(found).reshape(origin.shape[:-1])
-
-    def normal(self, points: Tensor) -> Tensor:
-        x, y, z = points.double().unbind(-1)
-        heights = y.clamp(self.low, self.high).cpu().numpy()
-        r, dr = (torch.as_tensor(f(heights)).to(y) for f in (self.radius, self.slope))
-        side = torch.stack((x, -r * dr, z), -1)
-        # a point nearer to an end than to the wall lies on that end
-        wall = (r - torch.hypot(x, z)).abs()
-        end = torch.minimum((y - self.low).abs(), (self.high - y).abs())
-        cap = torch.stack((0 * y, torch.where(y > (self.low + self.high) / 2, 1.0, -1.0).to(y), 0 * y), -1)
-        unit = torch.where((end < wall)[..., None], cap, side / side.norm(dim=-1, keepdim=True))
-        return unit.to(points.dtype)
-
-    def _march(self, origin: Tensor, direction: Tensor) -> Tensor:
-        """First crossing (ray,) from outside to inside, by `steps` trials and then by bisection."""
-        middle, half, widest = (self.low + self.high) / 2, (self.high - self.low) / 2, self.widest()
-        box = _row((widest, half, widest), origin)
-        start, beyond = _box(origin - _row((0.0, middle, 0.0), origin), direction, box)
-        start = start.clamp(min=0.0)
-        rays = (start < beyond).nonzero()[:, 0]
-        result = torch.full_like(start, torch.inf)
-        if not len(rays):
-            return result
-        start, length = start[rays], (beyond - start)[rays]
-
-        def value(share: Tensor) -> Tensor:
-            t = start + share * length
-            return self.inside(origin[rays] + t[:, None] * direction[rays])
-
-        trials = torch.linspace(0.0, 1.0, self.steps + 1, dtype=torch.float64, device=origin.device)
-        inside = torch.stack([value(trial) > 0 for trial in trials], -1)
-        entering = inside & ~torch.cat((torch.zeros_like(inside[:, :1]), inside[:, :-1]), -1)
-        met, first = entering.any(-1), entering.to(torch.uint8).argmax(-1)
-        high = trials[first]
-        low = (high - 1 / self.steps).clamp(min=0.0)
-        for _ in range(40):
-            mid = (low + high) / 2
-            low, high = torch.where(value(mid) > 0, low, mid), torch.where(value(mid) > 0, mid, high)
-        result[rays] = torch.where(met, start + high * length, torch.inf)
-        return result
+        return row(about_x, like) @ row(about_y, like)
 
 
 @dataclass(frozen=True)
@@ -253,6 +233,19 @@ class Group(Solid):
     def hit(self, origin: Tensor, direction: Tensor) -> Tensor:
         return torch.stack([solid.hit(origin, direction) for solid in self.solids]).amin(0)
 
+    def blocks(self, origin: Tensor, direction: Tensor, reach: Tensor | float = math.inf) -> Tensor:
+        return torch.stack([solid.blocks(origin, direction, reach) for solid in self.solids]).any(0)
+
+    def patches(self, count: int) -> Patches:
+        """As many for each solid; of a plane, which has no end, the part near the other solids."""
+        share = max(1, count // len(self.solids))
+        bodies = [solid.patches(share) for solid in self.solids if not isinstance(solid, Plane)]
+        if not bodies:
+            raise ValueError("Group.patches needs a solid of finite extent; found planes only.")
+        around = joined(bodies).points
+        planes = [solid.patches_below(around, share) for solid in self.solids if isinstance(solid, Plane)]
+        return joined(bodies + planes)
+
     def meet(self, origin: Tensor, direction: Tensor) -> tuple[Tensor, Tensor]:
         distances, normals = zip(*(solid.meet(origin, direction) for solid in self.solids), strict=True)
         distance, nearest = torch.stack(distances).min(0)
@@ -260,7 +253,7 @@ class Group(Solid):
         return distance, torch.stack(normals).gather(0, chosen)[0]
 
 
-def _slab(start: Tensor, along: Tensor, size: Tensor | float) -> tuple[Tensor, Tensor]:
+def slab(start: Tensor, along: Tensor, size: Tensor | float) -> tuple[Tensor, Tensor]:
     """Where a ray enters and leaves |coordinate| < size, each (...); enter > leave where it never is inside."""
     parallel = along == 0
     step = along.masked_fill(parallel, 1.0)
@@ -271,11 +264,11 @@ def _slab(start: Tensor, along: Tensor, size: Tensor | float) -> tuple[Tensor, T
     return enter, leave
 
 
-def _box(start: Tensor, along: Tensor, sizes: Tensor) -> tuple[Tensor, Tensor]:
-    """`_slab` in all three coordinates (..., 3)."""
-    enter, leave = _slab(start, along, sizes)
+def box(start: Tensor, along: Tensor, sizes: Tensor) -> tuple[Tensor, Tensor]:
+    """`slab` in all three coordinates (..., 3)."""
+    enter, leave = slab(start, along, sizes)
     return enter.amax(-1), leave.amin(-1)
 
 
-def _row(values, like: Tensor) -> Tensor:
+def row(values, like: Tensor) -> Tensor:
     return torch.tensor(values, dtype=torch.float64, device=like.device)

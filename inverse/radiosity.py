@@ -1,0 +1,109 @@
+r"""Light that goes from one part of the object to another: diffuse interreflection over its known geometry.
+
+The parts scatter as Lambert surfaces would, each of the same albedo rho, so the exitance B solves
+
+.. math:: B(x) = \rho\,\Bigl[E(x) + \int B(y)\,K(x, y)\,dA_y\Bigr], \qquad
+   K = \frac{\cos\theta_x \cos\theta_y}{\pi |x - y|^2}\,V(x, y)
+
+with E the irradiance that arrives straight from the lights and V = 1 where the object is not in between
+(Goral et al. 1984). Its series in rho has coefficients that know nothing of the material: the irradiance after
+b bounces between white parts, T_b = K^b E. A point then reflects the additional radiance
+sum_b rho^(b + 1) T_b / pi, which is differentiable in rho while the geometry is done once.
+"""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+import torch
+from torch import Tensor
+
+from inverse.exchange import Exchange, PairExchange, RingExchange
+from inverse.lights import Ambient, Light
+from inverse.relief import HeightField
+from inverse.solids import Solid
+from inverse.turned import Revolution
+from inverse.visibility import distance_to, shadowless, unshadowed
+
+_PATCHES = 16384  # of a solid of revolution
+_PAIRED_PATCHES = 1500  # of other solids, where every pair counts
+
+
+def no_interreflection(solid: Solid | None) -> str | None:
+    """Why no light is sent from one part of this solid to another; None where it may be.
+
+    For a convex solid there is none. On a surface whose back is unknown there may be some, and it cannot be found.
+    """
+    if solid is None or isinstance(solid, HeightField):
+        return "unknown: nothing but the visible side is given"
+    return "convex: no part of the surface sees another" if solid.convex else None
+
+
+def bounced(
+    solid: Solid, lights: Sequence[Light], points: Tensor, normals: Tensor, *,
+    tolerance: float = 1e-3, patches: int | None = None,
+) -> Tensor:  # fmt: skip
+    """Irradiance T_b (bounce, point, 1 or channel) after b = 1, 2, ... bounces between white parts of the solid.
+
+    Args:
+        solid: its extent must be known; a plane among others takes part up to 1000 of their half sizes away.
+        lights: that shine together; their cast shadows are followed.
+        points, normals: of the solid's surface (point, 3).
+        tolerance: bounces are added until all later ones together, at albedo 1, stay below this share of the
+            patches' largest direct irradiance: max(T_b) s/(1 - s), s the largest share of its sky that the
+            solid takes from any of its patches.
+        patches: pieces of the surface, by default 16384 of a solid of revolution and 1500 of another. On the default
+            vase the sum of T_b errs by at most 0.8, 0.33, 0.18 and 0.1 % of the irradiance facing the light with
+            64^2, 96^2, 128^2 and 160^2 patches, a tenth of that in the mean square, most at the groove of its foot.
+    Returns: zeros of one bounce for a convex solid, without any work.
+    Raises: ValueError for a solid whose extent is unknown, or patches so coarse that s >= 1.
+    The geometry is remembered for the last few solids. Differentiable in the lights' strengths.
+    """
+    if solid.convex:
+        return points.new_zeros(1, len(points), 1)
+    exchange = _exchange(solid, patches)
+    largest = float(exchange.share.max())
+    if not largest < 1:
+        raise ValueError(f"the patches are too coarse: one sees {largest:.2f} > 1 of itself in the others; take more.")
+    direct = direct_irradiance(exchange, lights)
+    left = [direct]
+    while True:
+        arrived = exchange.carry(left[-1])
+        if arrived.detach().max() * largest / (1 - largest) <= tolerance * direct.detach().max():
+            return exchange.arriving(torch.stack(left), points, normals).to(points.dtype)
+        left.append(arrived)
+
+
+def sky_share(solid: Solid, points: Tensor, normals: Tensor, *, patches: int | None = None) -> Tensor:
+    """Share (point,) of uniform light that the solid does not hide: 1 less its form factor, 1 where it is convex.
+
+    Uniform light of radiance L gives the irradiance pi L times this. Where it is 1 no other part is in sight, and
+    nothing bounces to the point.
+    """
+    if solid.convex:
+        return points.new_ones(len(points))
+    return (1 - _exchange(solid, patches).share_at(points, normals)).to(points.dtype)
+
+
+def direct_irradiance(exchange: Exchange, lights: Sequence[Light]) -> Tensor:
+    """Irradiance of the patches (patch, 1 or channel) by the lights, less what the solid hides from itself."""
+    solid, (points, normals, _) = exchange.solid, exchange.patches
+    total = points.new_zeros(len(points), 1)
+    for light in lights:
+        if isinstance(light, Ambient):
+            radiance = torch.atleast_1d(torch.as_tensor(light.radiance)).to(points)
+            total = total + math.pi * radiance * (1 - exchange.share)[:, None]
+            continue
+        for arrival in light.arrivals(points):
+            cosine = (normals * arrival.direction).sum(-1).clamp(min=0)
+            if solid is not None and shadowless(solid, light) is None:
+                cosine = cosine * unshadowed(solid, points, normals, arrival.direction, distance_to(light, points))
+            total = total + cosine[:, None] * arrival.irradiance
+    return total
+
+
+@lru_cache(maxsize=4)
+def _exchange(solid: Solid, patches: int | None) -> Exchange:
+    if isinstance(solid, Revolution):
+        return RingExchange(solid, patches or _PATCHES)
+    return PairExchange(solid, solid.patches(patches or _PAIRED_PATCHES))
