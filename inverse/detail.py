@@ -1,8 +1,9 @@
 """Which pixels need all their samples: where the radiance may vary inside a pixel."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import torch
 from torch import Tensor
@@ -12,15 +13,17 @@ from inverse.geometry import pixel_average
 from inverse.lights import Distant, Point
 from inverse.scene import Scene
 from inverse.shading import arrivals
+from inverse.simplify import changed
 
 # Shares of the pixels, smoothest first, that are tried with one sample.
 _SHARES = (1.0, 0.98, 0.95, 0.9, 0.8, 0.6, 0.4)
 
 
-def details(scene: Scene) -> Iterator[tuple[float, Tensor]]:
-    """Ever more pixels (rows, columns) that keep all their samples, and the share of those that do not.
+def details(scene: Scene) -> Iterator[tuple[str, Callable[[Scene], Scene]]]:
+    """Ways to leave samples out, from the cheapest on: what is done instead, and the change of the scene.
 
-    First those where the normals spread most; always those that the edge of an attached or cast shadow may cross.
+    Ever more pixels keep all their samples: first those where the normals spread most, and always those that the
+    edge of an attached or cast shadow may cross.
     """
     surface, s = scene.surface, scene.surface.samples
     mean = pixel_average(surface.normals, s)
@@ -38,7 +41,9 @@ def details(scene: Scene) -> Iterator[tuple[float, Tensor]]:
     for share in _SHARES:
         limit = torch.quantile(1 - length[full & ~edge].double(), share) if (full & ~edge).any() else 0.0
         detail = full & (edge | (1 - length.double() > limit))
-        yield float((full & ~detail).sum() / full.sum()), detail
+        merged = float((full & ~detail).sum() / full.sum())
+        choice = f"one sample in {merged:.0%} of the pixels, where the radiance hardly varies"
+        yield choice, partial(changed, detail=detail)
 
 
 def _borders(mask: Tensor) -> Tensor:

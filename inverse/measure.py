@@ -32,7 +32,7 @@ class SigmaBias:
     The limit is a share of the standard error of sigma that the sensor's noise leaves when all pixels are fitted.
     """
 
-    def __init__(self, reference: Tensor, tolerance: float, scene: Scene, model: BRDF, pixels: Tensor, total: int):
+    def __init__(self, reference: Tensor, tolerance: float, *, scene: Scene, model: BRDF, pixels: Tensor, total: int):
         self.reference = reference
         self.pixels = pixels
         sensor = scene.sensor

@@ -62,11 +62,10 @@ class Plan:
 
     def applied_to(self, scene: Scene) -> tuple[Scene, BRDF]:
         """The planned scene and model. ValueError where the plan was made for other images than the scene's."""
-        same = scene.surface.mask.shape == self.scene.surface.mask.shape and scene.images == self.scene.images
-        if not same:
+        planned, found = ((k.images, *k.surface.mask.shape) for k in (self.scene, scene))
+        if planned != found:
             raise ValueError(
-                f"the plan is for {self.scene.images} images of {tuple(self.scene.surface.mask.shape)} points, the scene "
-                f"has {scene.images} of {tuple(scene.surface.mask.shape)}: make a plan for this scene."
+                f"the plan is for (images, rows, columns) = {planned} and the scene has {found}: plan for this scene."
             )
         return self.scene, self.model
 

@@ -13,7 +13,7 @@ from inverse.pilot import pilot
 from inverse.plan import Effect, Plan
 from inverse.scene import Scene
 from inverse.shading import render
-from inverse.simplify import FOOTPRINT, SCENE_EFFECTS, changed, everything, simpler
+from inverse.simplify import FOOTPRINT, SCENE_EFFECTS, everything, simpler
 from torchbrdf import BRDF, EFFECTS, compact, is_per_texel, options, simulated
 
 
@@ -52,23 +52,17 @@ def plan(
     if of == "radiance":
         measure = RadianceDifference(reference, tolerance)
     else:
-        measure = SigmaBias(reference, tolerance, sample, model, chosen, int((full.surface.coverage() > 0).sum()))
+        total = int((full.surface.coverage() > 0).sum())
+        measure = SigmaBias(reference, tolerance, scene=sample, model=model, pixels=chosen, total=total)
     budget = measure.limit / safety
 
-    absent: dict[str, str] = {}
-    alone: dict[str, _Alone] = {}
-    present = []
-    for entry in simpler(full):
-        if entry.absent is not None:
-            absent[entry.effect] = entry.absent
-            continue
-        alone[entry.effect] = watch.alone(measure, entry.choice, entry.apply(sample), model)
-        present.append(entry)
+    entries = list(simpler(full))
+    absent = {entry.effect: entry.absent for entry in entries if entry.absent is not None}
+    present = [entry for entry in entries if entry.absent is None]
+    alone = {k.effect: watch.alone(measure, k.choice, k.apply(sample), model) for k in present}
     for option in (k for group in options(model).values() for k in group):
         found = watch.alone(measure, option.choice, sample, option.model)
-        for name in option.skips:
-            if name not in alone or found.size < alone[name].size:
-                alone[name] = found
+        alone |= {name: found for name in option.skips if name not in alone or found.size < alone[name].size}
 
     def error(scene: Scene, model: BRDF) -> float:
         return measure.size(watch.values(scene, model), scene, model)
@@ -76,17 +70,11 @@ def plan(
     stand_in, skipped = _cheapest_material(model, lambda k: error(sample, k) <= budget)
     left = full
     for entry in sorted(present, key=lambda k: -alone[k.effect].saved):
-        if entry.effect == FOOTPRINT:
-            continue
-        if error(entry.apply(sample), stand_in) <= budget:
-            sample, left = entry.apply(sample), entry.apply(left)
-            skipped[entry.effect] = entry.choice
-    if FOOTPRINT in alone:
-        for share, detail in details(left):
-            finer = changed(sample, detail=detail)
-            if error(finer, stand_in) <= budget:
-                sample, left = finer, changed(left, detail=detail)
-                skipped[FOOTPRINT] = f"one sample in {share:.0%} of the pixels, where the radiance hardly varies"
+        ways = details(left) if entry.effect == FOOTPRINT else [(entry.choice, entry.apply)]
+        for choice, apply in ways:
+            if error(apply(sample), stand_in) <= budget:
+                sample, left = apply(sample), apply(left)
+                skipped[entry.effect] = choice
                 break
     rows = [_row(name, alone, absent, skipped) for name in (*SCENE_EFFECTS, *simulated(model))]
     return Plan(

@@ -32,9 +32,8 @@ def received(cosines: Cosines, arrival: Arrival) -> Tensor:
 
 def arrivals(light: Directional, where: Footprints) -> Iterator[Arrival]:
     """The directions from which a light reaches the points, with no irradiance where the solid hides it."""
-    hides = where.solid is not None and shadowless(where.solid, light) is None
     for arrival in light.arrivals(where.points):
-        if not hides:
+        if where.solid is None or shadowless(where.solid, light) is not None:
             yield arrival
             continue
         far = distance_to(light, where.points)
