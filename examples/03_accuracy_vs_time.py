@@ -2,9 +2,11 @@
 
 Errors are against the exact model with all bounces: over the hemisphere up to 85 degrees, in images of
 the vase, and in sigma and rho when photographs made by the exact model are fitted with the rung.
+`--models` times every model of the library instead.
 """
 
 import argparse
+import inspect
 import json
 import math
 import platform
@@ -15,14 +17,31 @@ import matplotlib
 import matplotlib.pyplot as plt
 import torch
 
+import torchbrdf
 from inverse import Distant, Scene, Sensor, fit, render, usable, vase
-from torchbrdf import Cosines
-from torchbrdf.accuracy import RUNGS, Rung, ladder, reference
+from torchbrdf import BRDF, Cosines
+from torchbrdf.accuracy import RUNGS, Rung, forward_ratios, ladder, reference
 from torchbrdf.testing import random_directions
 
 matplotlib.use("Agg")
 HEMISPHERE = {"sigma": [5, 10, 20, 30, 40, 60], "rho": [0.3, 0.7, 0.9]}  # degrees
 VASE = {"sigma": [10, 30, 50], "rho": [0.3, 0.6, 0.9]}
+
+
+def every_model() -> dict[str, BRDF]:
+    """One of each public model, Lambert first; those that are made of other models left out."""
+    found: dict[str, BRDF] = {"Lambert": torchbrdf.Lambert()}
+    for name in torchbrdf.__all__:
+        kind = getattr(torchbrdf, name)
+        if not (isinstance(kind, type) and issubclass(kind, BRDF)) or inspect.isabstract(kind):
+            continue
+        if kind is torchbrdf.TabulatedBRDF:
+            found[name] = kind.of(torchbrdf.EON(), dtype=torch.float32)
+        elif kind is torchbrdf.TabulatedRoughSurface:
+            found[name] = kind(weights=torch.full((16,), 1 / 16))
+        elif kind not in (torchbrdf.Oriented, torchbrdf.WeightedSum):
+            found[name] = kind()
+    return found
 
 
 def on_the_vase(rungs: list[Rung], size: int, sigmas: list[float], rhos: list[float]) -> dict[str, dict[str, float]]:
@@ -75,6 +94,8 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("output"))
     parser.add_argument("--directions", type=int, default=1000)
     parser.add_argument("--size", type=int, default=64, help="rows of the vase images")
+    parser.add_argument("--models", action="store_true", help="forward time of every model, and nothing else")
+    parser.add_argument("--points", type=int, default=1 << 14, help="points a model is timed on, with --models")
     parser.add_argument("--rungs", nargs="*", help="names to keep (all)")
     parser.add_argument("--compiled", action="store_true", help="time the models under torch.compile (minutes)")
     parser.add_argument("--device", default="cpu", help="where to time")
@@ -82,6 +103,14 @@ def main() -> None:
     rungs = [rung for rung in RUNGS if not args.rungs or rung.name in args.rungs]
     directions = random_directions(args.directions, generator=torch.Generator().manual_seed(0))
     cosines = Cosines.of(*(d.to(args.device) for d in directions))
+    if args.models:
+        points = random_directions(args.points, generator=torch.Generator().manual_seed(0))
+        normal, light, view = (d.to(args.device) for d in points)
+        timed = Cosines.of(normal, light, view, tangent=torch.linalg.cross(normal, normal.roll(1, -1)))
+        models = {name: model.to(args.device) for name, model in every_model().items()}
+        for name, ratio in forward_ratios(models, timed).items():
+            print(f"{name:<26}{float(f'{ratio:.2g}'):8g} x")
+        return
     sigmas = [math.radians(s) for s in HEMISPHERE["sigma"]]
     table = ladder(sigmas, HEMISPHERE["rho"], cosines, rungs=rungs, compiled=args.compiled)
     vases = on_the_vase(rungs, args.size, VASE["sigma"], VASE["rho"])

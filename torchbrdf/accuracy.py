@@ -6,9 +6,9 @@ Lambert < qualitative < functional < closed-form slopes < fitted < exact slopes 
 import json
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import torch
 from torch import Tensor
@@ -199,18 +199,43 @@ def cost(
     }
 
 
-def _interleaved_medians(calls: dict[str, tuple[Callable[[], object], int]], repeats: int) -> dict[str, float]:
+def forward_ratios(models: Mapping[str, BRDF], cosines: Cosines, *, repeats: int = 9) -> dict[str, float]:
+    """By name: forward time relative to the first model, eager, for any models.
+
+    Args:
+        cosines: of the points to time on (...), with what the models read: `Cosines.of` keeps the vectors, and a
+            tangent for anisotropic ones.
+        repeats: timings of each, interleaved; the median counts.
+    On a CPU the time is that of the processor, all threads together, which other programs do not lengthen.
+    """
+    clock = time.process_time if cosines.light.device.type == "cpu" else time.perf_counter
+    products = cosines.light, cosines.view, cosines.phase
+
+    def call(model: BRDF) -> Tensor:  # what the cosines compute on demand is part of the cost
+        fresh = Cosines.from_products(*products)
+        return model.evaluate(replace(fresh, vectors=cosines.vectors, tangent=cosines.tangent))
+
+    with torch.no_grad():
+        seconds = _interleaved_medians({name: (lambda m=m: call(m), 1) for name, m in models.items()}, repeats, clock)
+    unit = next(iter(seconds.values()))
+    return {name: found / unit for name, found in seconds.items()}
+
+
+def _interleaved_medians(
+    calls: dict[str, tuple[Callable[[], object], int]], repeats: int, clock: Callable[[], float] = time.perf_counter
+) -> dict[str, float]:
     """Median seconds a point of each call; they take turns, so that a slower minute slows them all."""
     times: dict[str, list[float]] = {name: [] for name in calls}
     for call, _ in calls.values():
         call()
     for _ in range(repeats):
         for name, (call, count) in calls.items():
+            call()  # untimed: the model before left caches and heap in its own state
             _wait()
-            began = time.perf_counter()
+            began = clock()
             call()
             _wait()
-            times[name].append((time.perf_counter() - began) / count)
+            times[name].append((clock() - began) / count)
     return {name: statistics.median(found) for name, found in times.items()}
 
 

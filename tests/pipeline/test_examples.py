@@ -74,6 +74,14 @@ def test_ladder_is_measured_and_drawn(run, tmp_path):
     assert (tmp_path / "ladder_eager.png").exists()
 
 
+def test_every_model_is_timed(run):
+    printed = dict(line.split()[:2] for line in run("03_accuracy_vs_time.py", "--models", "--points", 200).splitlines())
+    models = {name for name, kind in vars(torchbrdf).items() if isinstance(kind, type) and issubclass(kind, BRDF)}
+    assert set(printed) == models - {"BRDF", "LinearBRDF", "ImageBRDF", "WeightedSum", "Oriented"}
+    assert next(iter(printed.items())) == ("Lambert", "1")
+    assert float(printed["RoughSurface"]) > float(printed["OrenNayar"])
+
+
 def test_figures_of_the_paper(run, tmp_path):
     printed = run("04_paper_figures.py", "--size", 16, "--points", 9, "--output", tmp_path).split()
     assert len(printed) == 12
