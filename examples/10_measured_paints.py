@@ -133,7 +133,7 @@ def verdict(paint: Paint, misses: dict[str, list[float]]) -> str:
         f"the best mixture ({mixed}) {misses[mixed][0]:.0f} %",
         f"plain f_r: 10 of {len(power)} samples hold {brightest:.2%} of the sum of squares",
         f"off the highlight the best model leaves {min(share[1] for share in misses.values()):.0f} %; where it was "
-        f"measured both ways, no reciprocal model leaves less than {paint.not_reciprocal():.0f} %: the data are not",
+        f"measured both ways, no reciprocal model leaves less than about {paint.not_reciprocal():.0f} %: the data are not",
     ]
     for end in rough:
         share = end.residual_rms / flat.residual_rms
