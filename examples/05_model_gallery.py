@@ -2,9 +2,9 @@
 
 One lamp at the upper right (a disc of half angle 4 degrees for the polished models, which show it) and one exposure
 for all pictures: a white matte surface that faces the lamp is full scale, brighter highlights are clipped, and the
-display encoding is sRGB. The mirror stands in a tiled room instead. Beside them
-f_r against the viewing angle for light from 20 and 50 degrees (dashed), mean of the channels, in the plane along x;
-below, the largest f_r. Thick lines are the mirror directions of polished models, the dotted arc is Lambert's (0.7).
+display encoding is sRGB. The mirror stands in a tiled room instead. Beside them f_r against the viewing
+angle for light from 20 and 50 degrees (dashed), mean of the channels, in the plane along x; below, the largest f_r.
+Thick lines are the mirror directions of polished models, the dotted arc is Lambert's (0.7).
 """
 
 import argparse
@@ -138,7 +138,7 @@ def picture(surface: Surface, model: tb.BRDF) -> Tensor:
     if isinstance(model, tb.Mirror):
         light = tiled_room()
     covered = surface.coverage()[..., None]
-    linear = (render(Scene(surface, [light]), model)[0] * math.pi).clamp(0, 1) + (1 - covered)
+    linear = (render(Scene(surface, [light]), model)[0] * math.pi).clamp(min=0).minimum(covered) + (1 - covered)
     return linear_rgb_to_rgb(linear.expand(-1, -1, 3).movedim(-1, 0)).movedim(0, -1)
 
 
