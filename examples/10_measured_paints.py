@@ -98,7 +98,7 @@ class Paint:
 
     def fit(self, model: tb.BRDF, *, off: bool = False) -> FitResult:
         parts = {k: getattr(self.data, k)[self.off | (not off)] for k in ("light", "view", "values")}
-        return fit_measurements(replace(self.data, **parts), model, knee=KNEE, max_steps=25, throw=False)
+        return fit_measurements(replace(self.data, **parts), model, knee=KNEE, max_steps=40, throw=False)
 
     def misses(self, model: tb.BRDF) -> list[float]:
         """Residual rms in percent of the rms of the data: everywhere, off the highlight, in and near it."""
