@@ -1,9 +1,10 @@
 """Every model at a glance: a sphere and a vase under one light, and the lobes in the plane of incidence.
 
-One light from the upper right and one exposure for all pictures: a white matte surface that faces the light is full
-scale, brighter highlights are clipped, and the display encoding is sRGB. Beside them f_r against the viewing angle
-for light from 20 and 50 degrees (dashed), mean of the channels, in the plane along x; below, the largest f_r. The
-dotted arc is that of Lambert with albedo 0.7.
+One lamp at the upper right (a disc of half angle 4 degrees for the polished models, which show it) and one exposure
+for all pictures: a white matte surface that faces the lamp is full scale, brighter highlights are clipped, and the
+display encoding is sRGB. The mirror stands in a tiled room instead. Beside them f_r against the viewing
+angle for light from 20 and 50 degrees (dashed), mean of the channels, in the plane along x; below, the largest f_r.
+Thick lines are the mirror directions of polished models, the dotted arc is Lambert's (0.7).
 """
 
 import argparse
@@ -19,7 +20,7 @@ from kornia.color import linear_rgb_to_rgb
 from torch import Tensor
 
 import torchbrdf as tb
-from inverse import Distant, Scene, render, side_by_side, sphere, vase
+from inverse import Disc, Distant, Environment, Scene, Surface, render, side_by_side, sphere, vase
 
 matplotlib.use("Agg")
 RHO = {"albedo": 0.7}
@@ -28,6 +29,8 @@ SLOPE = {"slope": math.radians(35)}
 GOLD = tb.Conductor(eta=torch.tensor([0.18, 0.42, 1.37]), k=torch.tensor([3.42, 2.35, 1.77]))
 ALONG_X = torch.tensor([1.0, 0.02, 0.03])  # nearly: parallel to no normal of a pixel
 GLASS = tb.Dielectric(eta=1.5)
+LAMP = torch.tensor([0.5, 0.4, 0.8])
+POLISHED = (tb.Coupled, tb.Dampened, tb.Mirror)
 INCIDENCE = {"tab:blue": 20, "tab:red": 50}  # [deg]
 
 
@@ -62,6 +65,7 @@ MODELS = {
     "Hapke\nrho 0.9, asymmetry -0.3, surge 0.5, 0.05": tb.Hapke(albedo=0.9),
     "Coupled\nrho 0.7 under Fresnel 0.04": tb.Coupled(**RHO),
     "Dampened\nrho 0.7 under Fresnel 0.04": tb.Dampened(**RHO),
+    "Mirror\ngold, in a tiled room": tb.Mirror(fresnel=GOLD),
     "Phong\nkd 0.5, ks 0.2, exponent 20": tb.Phong(diffuse=0.5, specular=0.2, exponent=20.0),
     "ModifiedPhong\nkd 0.5, ks 0.2, exponent 20": tb.ModifiedPhong(diffuse=0.5, specular=0.2, exponent=20.0),
     "MaxCosinePhong\nkd 0.5, ks 0.2, exponent 20": tb.MaxCosinePhong(diffuse=0.5, specular=0.2, exponent=20.0),
@@ -94,31 +98,47 @@ def lobe(model: tb.BRDF, degrees: float, polar: Tensor) -> Tensor:
     return model(normal, light, view).mean(-1)
 
 
-def panel(axes, caption: str, image: Tensor, curves: dict[str, np.ndarray], polar: np.ndarray) -> None:
+def panel(axes, caption: str, image: Tensor, curves: dict[str, np.ndarray], *, polished: bool) -> None:
     """[sphere and vase | lobes], with the name and the parameters above."""
     pictures, lobes = axes
+    polar = np.linspace(-np.pi / 2, np.pi / 2, len(next(iter(curves.values()))))
     pictures.imshow(image.numpy())
     name, parameters = caption.split("\n")
     pictures.set_title(name, fontsize=11, loc="left", fontweight="bold", pad=13)
     pictures.text(0, -2, parameters, fontsize=9, va="bottom")
     largest = max(float(curve.max()) for curve in curves.values())
+    scale = largest or 1.0
     for (colour, curve), degrees in zip(curves.items(), INCIDENCE.values(), strict=True):
-        lobes.plot(curve * np.sin(polar) / largest, curve * np.cos(polar) / largest, color=colour, linewidth=1.3)
+        lobes.plot(curve * np.sin(polar) / scale, curve * np.cos(polar) / scale, color=colour, linewidth=1.3)
         towards = math.radians(degrees)
         lobes.plot((0, math.sin(towards)), (0, math.cos(towards)), color=colour, linewidth=0.7, linestyle="--")
-    arc = 0.7 / math.pi / largest
-    lobes.plot(arc * np.sin(polar), arc * np.cos(polar), "k:", linewidth=0.9)
+        if polished:
+            lobes.plot((0, -math.sin(towards)), (0, math.cos(towards)), color=colour, linewidth=2.5)
+    if largest > 0:
+        lobes.plot(0.7 / math.pi / scale * np.sin(polar), 0.7 / math.pi / scale * np.cos(polar), "k:", linewidth=0.9)
     lobes.plot((-1, 1), (0, 0), "k", linewidth=0.6)
-    lobes.text(0, -0.04, f"{largest:.2g}/sr", fontsize=9, ha="center", va="top")
+    lobes.text(0, -0.04, f"{largest:.2g}/sr" if largest > 0 else "nothing else", fontsize=9, ha="center", va="top")
     lobes.set(xlim=(-1.05, 1.05), ylim=(-0.2, 1.05), aspect="equal")
     for axis in axes:
         axis.set_axis_off()
 
 
-def picture(scene: Scene, model: tb.BRDF) -> Tensor:
+def tiled_room(rows: int = 12) -> Environment:
+    """Tiles as wide as high, every other one black, blue above and brown below."""
+    tiles = torch.arange(rows)[:, None] + torch.arange(2 * rows)
+    colours = torch.tensor([[0.7, 0.85, 1.0], [0.5, 0.3, 0.15]]).repeat_interleave(rows // 2, 0)
+    return Environment((tiles % 2)[..., None] * colours[:, None] / math.pi)
+
+
+def picture(surface: Surface, model: tb.BRDF) -> Tensor:
     """For the display (rows, columns, 3), on white; mixed in linear light, so that edges stay smooth."""
-    covered = scene.surface.coverage()[..., None]
-    linear = (render(scene, model)[0] * math.pi).clamp(0, 1) + (1 - covered)
+    light = Distant(LAMP)
+    if isinstance(model, POLISHED):
+        light = Disc(LAMP, half_angle=math.radians(4))
+    if isinstance(model, tb.Mirror):
+        light = tiled_room()
+    covered = surface.coverage()[..., None]
+    linear = (render(Scene(surface, [light]), model)[0] * math.pi).clamp(min=0).minimum(covered) + (1 - covered)
     return linear_rgb_to_rgb(linear.expand(-1, -1, 3).movedim(-1, 0)).movedim(0, -1)
 
 
@@ -134,7 +154,6 @@ def main() -> None:
     args.output.mkdir(parents=True, exist_ok=True)
     n = args.size
     objects = side_by_side([sphere(n, n, samples=3), vase(n, 3 * n // 4, samples=3)])
-    scene = Scene(objects, [Distant(torch.tensor([0.5, 0.4, 0.8]))])
     shown = list(MODELS.items())[: args.models]
     rows = math.ceil(len(shown) / args.columns)
     figure, axes = plt.subplots(
@@ -146,7 +165,7 @@ def main() -> None:
     polar = torch.linspace(-math.pi / 2, math.pi / 2, args.points)
     for place, (caption, model) in zip(axes.reshape(-1, 2), shown, strict=False):
         curves = {colour: lobe(model, degrees, polar).numpy() for colour, degrees in INCIDENCE.items()}
-        panel(place, caption, picture(scene, model), curves, polar.numpy())
+        panel(place, caption, picture(objects, model), curves, polished=isinstance(model, POLISHED))
         print(caption.replace("\n", ": "), flush=True)
     figure.supxlabel(textwrap.fill(" ".join(__doc__.split()), 175), fontsize=10)
     path = args.output / "model_gallery.png"

@@ -4,6 +4,7 @@ The data are the gonioreflectometer measurements of the Cornell Program of Compu
 31 wavelengths, here the means of three bands. Each band has an albedo and a reflectance at normal incidence of its own;
 shapes are shared. The residual is that of `inverse.fit_measurements` with a knee of 0.01/sr (a Lambert surface of 3 %):
 f_r cos(light) cos(view), whose logarithm counts above the knee. Plain f_r would fit a handful of highlights.
+Takes about two minutes.
 """
 
 import argparse
@@ -132,8 +133,8 @@ def verdict(paint: Paint, misses: dict[str, list[float]]) -> str:
         f"{paint.name} is {kind}: the best diffuse model ({matte}) leaves {misses[matte][0]:.0f} %, "
         f"the best mixture ({mixed}) {misses[mixed][0]:.0f} %",
         f"plain f_r: 10 of {len(power)} samples hold {brightest:.2%} of the sum of squares",
-        f"off the highlight the best model leaves {min(share[1] for share in misses.values()):.0f} %; where it was "
-        f"measured both ways, no reciprocal model leaves less than {paint.not_reciprocal():.0f} %: the data are not",
+        f"off the highlight the best model leaves {min(share[1] for share in misses.values()):.0f} %; the data are not "
+        f"reciprocal: of pairs measured both ways, any reciprocal model leaves about {paint.not_reciprocal():.0f} %",
     ]
     for end in rough:
         share = end.residual_rms / flat.residual_rms
