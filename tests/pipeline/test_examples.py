@@ -107,7 +107,7 @@ def test_paints_are_fitted_and_called_glossy(run, tmp_path):
     names = ("Lambert", "Lambert + GGX")
     if not CORNELL.is_dir():
         pytest.skip("the measured paints are not at hand")
-    printed = run("10_measured_paints.py", CORNELL, "--paints", 1, "--models", *names, "--output", tmp_path)
+    printed = run("09_measured_paints.py", CORNELL, "--paints", 1, "--models", *names, "--output", tmp_path)
     rows = {name: next(x for x in printed.splitlines() if x.startswith(f"{name:<20}")) for name in names}
     matte, glossy = (int(row[29:].split("/")[0]) for row in rows.values())
     assert glossy < 0.7 * matte
@@ -117,7 +117,7 @@ def test_paints_are_fitted_and_called_glossy(run, tmp_path):
 
 def test_paints_that_are_not_there(run, tmp_path, capsys):
     with pytest.raises(SystemExit) as ended:
-        run("10_measured_paints.py", tmp_path)
+        run("09_measured_paints.py", tmp_path)
     assert ended.value.code == 2
     assert f"no .brdf files in {tmp_path}" in capsys.readouterr().err
 
