@@ -59,8 +59,8 @@ def series_over_g(g: Tensor, t: Tensor) -> Tensor:
     """
     if g.dtype != t.dtype or g.dtype not in _SCHEMES:
         raise TypeError(f"series_over_g: g and t must both be float32 or both float64; found {g.dtype} and {t.dtype}")
-    function = _Derivatives if torch.compiler.is_compiling() else _EagerDerivatives
-    return function.apply(*torch.broadcast_tensors(g, t), (0, 0))[0]
+    function = _captured if torch.compiler.is_compiling() else _Eager.apply
+    return function(*torch.broadcast_tensors(g, t), [0, 0])[0]
 
 
 def first_terms_over_g(g: Tensor, t: Tensor, *, terms: int) -> Tensor:
@@ -76,70 +76,8 @@ def first_terms_over_g(g: Tensor, t: Tensor, *, terms: int) -> Tensor:
     return total * torch.exp(-g)
 
 
-class _Derivatives(torch.autograd.Function):
-    """Derivatives of S/g stacked in front, (order, ...); `orders` is n, q, n, q, ...: n times by g, q times by t.
-
-    torch.compile takes no function with a forward mode of its own, so that this one has none.
-    """
-
-    @staticmethod
-    def forward(g, t, orders):
-        return _poisson_means(g, t, orders)
-
-    @staticmethod
-    def setup_context(ctx, inputs, output):
-        g, t, ctx.orders = inputs
-        ctx.save_for_backward(g, t)
-        ctx.save_for_forward(g, t)
-
-    @staticmethod
-    def backward(ctx, upstream):  # pyright: ignore[reportIncompatibleMethodOverride]
-        by_g, by_t = _slopes(_Derivatives, ctx)
-        return (by_g * upstream).sum(0), (by_t * upstream).sum(0), None
-
-
-class _EagerDerivatives(_Derivatives):
-    """The same, with forward mode and vmap."""
-
-    @staticmethod
-    def backward(ctx, upstream):  # pyright: ignore[reportIncompatibleMethodOverride]
-        by_g, by_t = _slopes(_EagerDerivatives, ctx)
-        return (by_g * upstream).sum(0), (by_t * upstream).sum(0), None
-
-    @staticmethod
-    def jvp(ctx, g_tangent, t_tangent, _):  # pyright: ignore[reportIncompatibleMethodOverride]
-        by_g, by_t = _slopes(_EagerDerivatives, ctx)
-        return by_g * g_tangent + by_t * t_tangent
-
-    @staticmethod
-    def vmap(info, in_dims, g, t, orders):  # pyright: ignore[reportIncompatibleMethodOverride]
-        batched = [
-            x.expand(info.batch_size, *x.shape) if dim is None else x.movedim(dim, 0)
-            for x, dim in zip((g, t), in_dims[:2], strict=True)
-        ]
-        return _EagerDerivatives.apply(*batched, orders), 1
-
-
-def _slopes(function, ctx) -> tuple[Tensor, Tensor]:
-    """d/dg and d/dt of each output, (order, ...)."""
-    pairs = _pairs(ctx.orders)
-    raised = sorted({(n + 1, q) for n, q in pairs} | {(n, q + 1) for n, q in pairs})
-    if max(n + q for n, q in raised) > _HIGHEST_DERIVATIVE:
-        raise NotImplementedError(f"series_over_g has {_HIGHEST_DERIVATIVE} derivatives; one more was asked for")
-    found = function.apply(*ctx.saved_tensors, tuple(i for pair in raised for i in pair))
-    by_g, by_t = ([raised.index((n + 1 - up, q + up)) for n, q in pairs] for up in (0, 1))
-    return found[by_g], found[by_t]
-
-
-def _pairs(orders: Sequence[int]) -> list[tuple[int, int]]:
-    return list(zip(orders[::2], orders[1::2], strict=True))
-
-
-@torch.library.custom_op(
-    "torchbrdf::poisson_means", mutates_args=(), schema="(Tensor g, Tensor t, int[] orders) -> Tensor"
-)
-def _poisson_means(g, t, orders):
-    """What `_Derivatives` gives; opaque to torch.compile, for its work depends on the numbers in g and t."""
+def _derivatives(g: Tensor, t: Tensor, orders: Sequence[int]) -> Tensor:
+    """Derivatives of S/g stacked in front, (order, ...); `orders` is n, q, n, q, ...: n times by g, q times by t."""
     pairs = _pairs(orders)
     # A derivative by g is a difference that changes sign: its digits are kept by float64 alone.
     dtype = torch.float64 if max(orders) > 0 else g.dtype
@@ -150,9 +88,70 @@ def _poisson_means(g, t, orders):
     return found.view(len(pairs), *g.shape)
 
 
-@_poisson_means.register_fake
-def _(g, t, orders):
-    return g.new_empty((len(orders) // 2, *g.shape))
+def _pairs(orders: Sequence[int]) -> list[tuple[int, int]]:
+    return list(zip(orders[::2], orders[1::2], strict=True))
+
+
+def _remember(ctx, inputs, output) -> None:
+    g, t, ctx.orders = inputs
+    ctx.save_for_backward(g, t)
+
+
+def _slopes(function, ctx) -> tuple[Tensor, Tensor]:
+    """d/dg and d/dt of each output (order, ...): derivatives one order higher, by the same function."""
+    pairs = _pairs(ctx.orders)
+    raised = sorted({(n + 1, q) for n, q in pairs} | {(n, q + 1) for n, q in pairs})
+    if max(n + q for n, q in raised) > _HIGHEST_DERIVATIVE:
+        raise NotImplementedError(f"series_over_g has {_HIGHEST_DERIVATIVE} derivatives; one more was asked for")
+    found = function(*ctx.saved_tensors, [i for pair in raised for i in pair])
+    by_g, by_t = ([raised.index((n + 1 - up, q + up)) for n, q in pairs] for up in (0, 1))
+    return found[by_g], found[by_t]
+
+
+def _pulled_back(function, ctx, upstream: Tensor) -> tuple[Tensor, Tensor, None]:
+    by_g, by_t = _slopes(function, ctx)
+    return (by_g * upstream).sum(0), (by_t * upstream).sum(0), None
+
+
+class _Eager(torch.autograd.Function):
+    """`_derivatives` in reverse mode, forward mode and vmap."""
+
+    @staticmethod
+    def forward(g, t, orders):
+        return _derivatives(g, t, orders)
+
+    @staticmethod
+    def setup_context(ctx, inputs, output):
+        _remember(ctx, inputs, output)
+        ctx.save_for_forward(*inputs[:2])
+
+    @staticmethod
+    def backward(ctx, upstream):  # pyright: ignore[reportIncompatibleMethodOverride]
+        return _pulled_back(_Eager.apply, ctx, upstream)
+
+    @staticmethod
+    def jvp(ctx, g_tangent, t_tangent, _):  # pyright: ignore[reportIncompatibleMethodOverride]
+        by_g, by_t = _slopes(_Eager.apply, ctx)
+        return by_g * g_tangent + by_t * t_tangent
+
+    @staticmethod
+    def vmap(info, in_dims, g, t, orders):  # pyright: ignore[reportIncompatibleMethodOverride]
+        batched = [
+            x.expand(info.batch_size, *x.shape) if dim is None else x.movedim(dim, 0)
+            for x, dim in zip((g, t), in_dims[:2], strict=True)
+        ]
+        return _Eager.apply(*batched, orders), 1
+
+
+# Opaque to torch.compile: how much is to be done for an entry depends on its numbers.
+_captured = torch.library.custom_op(
+    "torchbrdf::he_torrance_series",
+    _derivatives,
+    mutates_args=(),
+    schema="(Tensor g, Tensor t, int[] orders) -> Tensor",
+)
+_captured.register_fake(lambda g, t, orders: g.new_empty((len(orders) // 2, *g.shape)))
+_captured.register_autograd(lambda ctx, upstream: _pulled_back(_captured, ctx, upstream), setup_context=_remember)
 
 
 def _fill(found: Tensor, g: Tensor, t: Tensor, orders: list[tuple[int, int]]) -> None:
@@ -172,7 +171,8 @@ def _fill(found: Tensor, g: Tensor, t: Tensor, orders: list[tuple[int, int]]) ->
             continue
         here = g.index_select(0, chosen), t.index_select(0, chosen)
         if number < len(scheme.sums):
-            means = _sum(*here, orders, terms=_terms(scheme.sums[number], scheme.tail))
+            end = scheme.sums[number]
+            means = _sum(*here, orders, m=end, terms=_terms(end, scheme.tail))
         else:
             means = expansion(*here, orders, degree=scheme.expansions[number - len(scheme.sums)][1])
         for row, mean in zip(found, means, strict=True):
@@ -188,8 +188,13 @@ def _terms(m: float, tail: float) -> int:
     return n
 
 
-def _sum(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, terms: int) -> list[Tensor]:
-    """Means over the first terms by Horner's rule: no factorials, and no power of g that could overflow."""
+def _sum(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, m: float, terms: int) -> list[Tensor]:
+    """Means over the first terms for g up to m, by Horner's rule in g over a power of two.
+
+    So each step rounds twice and no more, and the coefficients g^j/j! are neither too large nor too small for float32.
+    """
+    unit = 2.0 ** round(math.log2(m))
+    scaled = g / unit
     most = max(n for n, _ in orders)
     totals = [torch.zeros_like(g) for _ in orders]
     above: dict[int, list[Tensor]] = {q: [] for _, q in orders}
@@ -201,7 +206,7 @@ def _sum(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, terms: int) -> 
                 differences.append(higher - differences[-1])
             above[q] = differences
         if j < terms:
-            for i, (n, q) in enumerate(orders):
-                totals[i] = torch.addcmul(above[q][n], g, totals[i], value=1 / (j + 1))
+            for total, (n, q) in zip(totals, orders, strict=True):
+                total.mul_(scaled).add_(above[q][n], alpha=unit**j / math.factorial(j))
     weight = torch.exp(-g)
     return [total * weight for total in totals]
