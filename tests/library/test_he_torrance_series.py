@@ -203,7 +203,7 @@ def test_float32():
         assert got.dtype == F32
         seen &= exact[0] / g.double().clamp(min=1) > 1e-30
         excess = (got.double() - expected).abs() / (bar(F32, g.double(), S) * expected.abs().maximum(least))
-        assert excess[seen].max() <= 1  # measured over 10 million: 0.85 of the value, 0.05 of the derivatives
+        assert excess[seen].max() <= 1  # measured over 5 million: 0.56 of the value, 0.05 of the derivatives
 
 
 def extremes(n, dtype, seed):
@@ -212,7 +212,8 @@ def extremes(n, dtype, seed):
     ordinary = torch.rand(n, generator=generator) < 0.5  # where all of it happens
     g = torch.where(ordinary, g**0.2, g)
     t = torch.where(ordinary, 10 ** (-3 + 6 * torch.rand(n, dtype=F64, generator=generator)) * g.clamp(min=1), t)
-    g[::17], t[::13] = 0, 0
+    denormal = torch.finfo(dtype).tiny / 8
+    g[::17], t[::13], g[1::17], t[1::13] = 0, 0, denormal, denormal
     return g.to(dtype), t.to(dtype)
 
 

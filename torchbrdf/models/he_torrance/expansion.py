@@ -37,11 +37,10 @@ def expansion(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, degree: in
     """Derivatives of S/g, n times by g and q times by t for each (n, q) of the orders, (...).
 
     Args:
-        g, t: (...), with the largest term at m well above 30; see `series` for what that gives.
+        g, t: (...), with the largest term at m above 30, so that g > 0.
         orders: n + q <= 2.
         degree: highest power of 1/m. The relative error is about a_(degree + 1)/m^(degree + 1).
     """
-    g = g.clamp(min=torch.finfo(g.dtype).tiny)  # g = 0 has no value that is not 0 so far out
     w = lambert_w((2 * (t / g) / g).clamp(max=_LARGEST_X))
     m = (g * (w / 2).exp()).clamp(min=1.0)
     v, y = 1 / (1 + w), 1 / m
