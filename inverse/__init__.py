@@ -23,12 +23,15 @@ from inverse.maps import from_depth, from_normals
 from inverse.measured import Measurements, read_gonioreflectometer, read_merl, read_optical_constants
 from inverse.measured_fit import fit_measurements, weighted_reflectance
 from inverse.photos import Photographs, read_image, read_stack, usable, write_image, write_stack
+from inverse.plan import Effect, Plan
+from inverse.planning import plan
 from inverse.profile import belly_row, cross_section, peak_position
 from inverse.radiometry import exitance, irradiance, solid_angle_of_band, solid_angle_of_cone, solid_angle_of_patch
 from inverse.result import FitResult
 from inverse.scene import Scene
 from inverse.sensor import Sensor
 from inverse.shading import render
+from inverse.simplify import everything
 from inverse.solids import Cuboid, Cylinder, Group, Plane, Solid, Sphere
 from inverse.turned import Revolution
 
@@ -38,12 +41,14 @@ __all__ = [
     "Cylinder",
     "Disc",
     "Distant",
+    "Effect",
     "Environment",
     "FitError",
     "FitResult",
     "Group",
     "Measurements",
     "Photographs",
+    "Plan",
     "Plane",
     "Point",
     "Revolution",
@@ -57,6 +62,7 @@ __all__ = [
     "cross_section",
     "cuboid",
     "cylinder",
+    "everything",
     "exitance",
     "fit",
     "fit_measurements",
@@ -67,6 +73,7 @@ __all__ = [
     "peak_position",
     "photographed",
     "pinhole",
+    "plan",
     "plane",
     "read_gonioreflectometer",
     "read_image",

@@ -1,5 +1,6 @@
 """Error bars from refitting: what changes when other photographs had been taken."""
 
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -41,6 +42,7 @@ def bootstrap(
         raise ValueError(f"bootstrap needs at least 2 samples; found {samples}.")
     if scene.images < _FEWEST_IMAGES:
         raise ValueError(f"bootstrap resamples images and needs at least {_FEWEST_IMAGES}; found {scene.images}.")
+    settings: dict[str, Any] = options | {"throw": False}
     generator = torch.Generator().manual_seed(seed)
     found: dict[str, list[Tensor]] = {}
     refused: list[str] = []
@@ -49,9 +51,9 @@ def bootstrap(
         drawn = torch.zeros(scene.images, dtype=torch.long)
         while len(drawn.unique()) < 2:  # one image over and over would say what that image says
             drawn = torch.randint(scene.images, (scene.images,), generator=generator)
-        again = Scene(scene.surface, [scene.lights[k] for k in drawn.tolist()], scene.sensor)
+        again = replace(scene, lights=[scene.lights[k] for k in drawn.tolist()])
         kept = None if valid is None else valid[drawn]
-        result = fit(again, photographs[drawn], model, valid=kept, **options | {"throw": False})
+        result = fit(again, photographs[drawn], model, valid=kept, **settings)
         if result.status not in ("converged", "at bound"):
             refused.append(f"{result.status}: {result.reason}")
             continue

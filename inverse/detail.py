@@ -13,7 +13,6 @@ from inverse.geometry import pixel_average
 from inverse.lights import Distant, Point
 from inverse.scene import Scene
 from inverse.shading import arrivals
-from inverse.simplify import changed
 
 # Shares of the pixels, smoothest first, that are tried with one sample.
 _SHARES = (1.0, 0.98, 0.95, 0.9, 0.8, 0.6, 0.4)
@@ -43,7 +42,7 @@ def details(scene: Scene) -> Iterator[tuple[str, Callable[[Scene], Scene]]]:
         detail = full & (edge | (1 - length.double() > limit))
         merged = float((full & ~detail).sum() / full.sum())
         choice = f"one sample in {merged:.0%} of the pixels, where the radiance hardly varies"
-        yield choice, partial(changed, detail=detail)
+        yield choice, partial(replace, detail=detail)
 
 
 def _borders(mask: Tensor) -> Tensor:

@@ -53,8 +53,9 @@ def footprints(surface: Surface, detail: Tensor | None = None) -> Footprints:
 
     Args:
         detail: pixels (rows, columns) that need all their points. Of the others those that the object fills
-            get one point instead, with the mean position and the mean directions: exact to first order in the
-            variation inside the pixel. None: all points everywhere.
+            get one point instead, with the mean directions and the mean position, raised to the highest of the
+            points so that it does not lie inside a bulge: exact to first order in the variation inside the pixel.
+            None: all points everywhere.
     """
     rows, columns = surface.resolution
     s, mask = surface.samples, surface.mask
@@ -67,10 +68,14 @@ def footprints(surface: Surface, detail: Tensor | None = None) -> Footprints:
             raise ValueError(f"detail must be bool of shape {(rows, columns)}; found {found}.")
         merged = ~detail & (surface.coverage() == 1)
     kept = mask & ~merged.repeat_interleave(s, 0).repeat_interleave(s, 1)
+    upright = _unit(pixel_average(surface.normals, s)[merged])
+    middle = pixel_average(surface.points, s)[merged]
+    block = surface.points.unflatten(0, (rows, s)).unflatten(2, (columns, s)).transpose(1, 2)[merged].flatten(1, 2)
+    rise = ((block - middle[:, None]) * upright[:, None]).sum(-1).amax(-1, keepdim=True)
     weight = surface.normals.new_full((int(kept.sum()),), 1 / s**2)
     return Footprints(
-        torch.cat((surface.points[kept], pixel_average(surface.points, s)[merged])),
-        torch.cat((surface.normals[kept], _unit(pixel_average(surface.normals, s)[merged]))),
+        torch.cat((surface.points[kept], middle + rise * upright)),
+        torch.cat((surface.normals[kept], upright)),
         surface.view
         if surface.view.ndim == 1
         else torch.cat((surface.view[kept], _unit(pixel_average(surface.view, s)[merged]))),

@@ -1,13 +1,13 @@
 """The size of a difference between two simulations: in radiance, or in the sigma a fit would find."""
 
 import math
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from inverse.prediction import predictor
 from inverse.scene import Scene
-from inverse.simplify import changed
 from torchbrdf import BRDF, trainable
 
 
@@ -63,7 +63,7 @@ class SigmaBias:
         entries = trainable(model)
         own = dict(model.named_parameters())
         raws = {raw: own[raw].detach() for raw, _ in entries.values()}
-        bare = changed(scene, sensor=type(scene.sensor)())
+        bare = replace(scene, sensor=type(scene.sensor)())
         predict = predictor(bare, model, self.pixels, per_texel=False)
         jacobian = torch.func.jacfwd(predict)(raws)
         columns, scale, names, place = [], [], [], 0

@@ -8,7 +8,6 @@ from torch import Tensor
 from inverse.geometry import pixel_average
 from inverse.lights import Distant, Point
 from inverse.scene import Scene
-from inverse.simplify import changed
 from inverse.visibility import distance_to, shadowless, unshadowed
 
 # Bins of a polar angle, from along the axis to perpendicular, and beyond.
@@ -36,7 +35,7 @@ def pilot(scene: Scene, count: int, seed: int) -> tuple[Scene, Tensor]:
     chosen[order[rank.argsort(stable=True)[:count]]] = True
     pixels = torch.zeros_like(shown).masked_scatter(shown, chosen)
     fine = pixels.repeat_interleave(surface.samples, 0).repeat_interleave(surface.samples, 1)
-    return changed(scene, surface=replace(surface, mask=surface.mask & fine)), pixels
+    return replace(scene, surface=replace(surface, mask=surface.mask & fine)), pixels
 
 
 def _strata(scene: Scene) -> tuple[Tensor, Tensor]:

@@ -67,16 +67,20 @@ def plan(
     def error(scene: Scene, model: BRDF) -> float:
         return measure.size(watch.values(scene, model), scene, model)
 
-    stand_in, skipped = _cheapest_material(model, lambda k: error(sample, k) <= budget)
+    stand_in, done = _cheapest_material(model, lambda k: error(sample, k) <= budget)
     left = full
     for entry in sorted(present, key=lambda k: -alone[k.effect].saved):
         ways = details(left) if entry.effect == FOOTPRINT else [(entry.choice, entry.apply)]
         for choice, apply in ways:
             if error(apply(sample), stand_in) <= budget:
                 sample, left = apply(sample), apply(left)
-                skipped[entry.effect] = choice
+                done[entry.effect] = choice
                 break
-    rows = [_row(name, alone, absent, skipped) for name in (*SCENE_EFFECTS, *simulated(model))]
+    verdicts = {name: (False, f"small enough; instead: {choice}") for name, choice in done.items()}
+    if FOOTPRINT in done and left.detail is not None and left.detail.any():
+        verdicts[FOOTPRINT] = (True, f"in part; {done[FOOTPRINT]}")
+    verdicts |= {name: (False, reason) for name, reason in absent.items()}
+    rows = [_row(name, alone.get(name), verdicts.get(name), budget) for name in (*SCENE_EFFECTS, *simulated(model))]
     return Plan(
         scene=left, model=compact(stand_in), effects=(*rows, *_others(full, model)), of=of, tolerance=tolerance,
         limit=measure.limit, error=error(sample, stand_in), safety=safety, pilot=int(chosen.sum()),
@@ -132,13 +136,14 @@ def _cheapest_material(model: BRDF, close: Callable[[BRDF], bool]) -> tuple[BRDF
                 break
 
 
-def _row(name: str, alone: dict[str, _Alone], absent: dict[str, str], skipped: dict[str, str]) -> Effect:
-    if name in absent:
-        return Effect(name, None if absent[name].startswith("unknown") else 0.0, False, absent[name])
-    found = alone[name]
-    if name in skipped:
-        return Effect(name, found.size, False, f"small enough; instead: {skipped[name]}", found.saved)
-    return Effect(name, found.size, True, f"needed; not close enough: {found.choice}", found.saved)
+def _row(name: str, alone: _Alone | None, verdict: tuple[bool, str] | None, budget: float) -> Effect:
+    if alone is None:
+        assert verdict is not None
+        return Effect(name, None if verdict[1].startswith("unknown") else 0.0, *verdict)
+    reason = f"needed; too far off: {alone.choice}"
+    if alone.size <= budget:
+        reason = "small, but what is simulated brings it, or others have used up the tolerance"
+    return Effect(name, alone.size, *(verdict or (True, reason)), time=alone.saved)
 
 
 def _others(scene: Scene, model: BRDF) -> list[Effect]:

@@ -41,7 +41,7 @@ class Simpler:
 
 def everything(scene: Scene) -> Scene:
     """The scene with every effect it could have."""
-    return changed(scene, shadows=True, between_parts=no_interreflection(scene.surface.solid) is None, detail=None)
+    return replace(scene, shadows=True, between_parts=no_interreflection(scene.surface.solid) is None, detail=None)
 
 
 def simpler(scene: Scene) -> Iterator[Simpler]:
@@ -53,9 +53,9 @@ def simpler(scene: Scene) -> Iterator[Simpler]:
         CAST_SHADOWS,
         reasons[0] if all(reasons) else None,
         "lit wherever the surface faces the light",
-        lambda s: changed(s, shadows=False),
+        lambda s: replace(s, shadows=False),
     )
-    yield Simpler(BETWEEN_PARTS, no_interreflection(surface.solid), "none", lambda s: changed(s, between_parts=False))
+    yield Simpler(BETWEEN_PARTS, no_interreflection(surface.solid), "none", lambda s: replace(s, between_parts=False))
     middle = surface.points[surface.mask].mean(0)
     yield Simpler(
         NEAR_LIGHT,
@@ -69,7 +69,7 @@ def simpler(scene: Scene) -> Iterator[Simpler]:
         PERSPECTIVE,
         "the view is orthographic: one vector an image" if orthographic else None,
         "one view vector for the image",
-        lambda s: changed(s, surface=replace(s.surface, view=view / view.norm())),
+        lambda s: replace(s, surface=replace(s.surface, view=view / view.norm())),
     )
     yield Simpler(
         SOFTNESS,
@@ -89,25 +89,19 @@ def simpler(scene: Scene) -> Iterator[Simpler]:
         AMBIENT,
         "no ambient light" if not _any(lights, Ambient) else "the only light" if alone else None,
         "none",
-        lambda s: changed(s, lights=[[k for k in entry if not isinstance(k, Ambient)] or entry for entry in s.lights]),
+        lambda s: replace(s, lights=[[k for k in entry if not isinstance(k, Ambient)] or entry for entry in s.lights]),
     )
     yield Simpler(
         FOOTPRINT,
         "one sample a pixel" if surface.samples == 1 else None,
         "one sample where the radiance hardly varies inside a pixel",
-        lambda s: changed(s, detail=torch.zeros(s.surface.resolution, dtype=torch.bool)),
+        lambda s: replace(s, detail=torch.zeros(s.surface.resolution, dtype=torch.bool)),
     )
-
-
-def changed(scene: Scene, **values) -> Scene:
-    """The scene with some of its attributes replaced."""
-    names = ("surface", "lights", "sensor", "shadows", "between_parts", "detail")
-    return Scene(**({name: getattr(scene, name) for name in names} | values))
 
 
 def relit(scene: Scene, change: Callable[[Light], Light]) -> Scene:
     """The scene with each light replaced."""
-    return changed(scene, lights=[[change(light) for light in entry] for entry in scene.lights])
+    return replace(scene, lights=[[change(light) for light in entry] for entry in scene.lights])
 
 
 def _any(lights: list[Light], kind: type) -> bool:
