@@ -56,9 +56,14 @@ def bounced(
             vase the sum of T_b errs by at most 0.8, 0.33, 0.18 and 0.1 % of the irradiance facing the light with
             64^2, 96^2, 128^2 and 160^2 patches, a tenth of that in the mean square, most at the groove of its foot.
     Returns: zeros of one bounce for a convex solid, without any work.
-    Raises: ValueError for a solid whose extent is unknown, or patches so coarse that q >= 1.
-    The geometry is remembered for the last few solids. Differentiable in the lights' strengths.
+    Raises: ValueError for a solid whose extent is unknown, or patches so coarse that q >= 1; a tolerance that
+        is not positive.
+    The geometry is remembered for the last few solids, on the CPU. Differentiable in the lights' strengths. Among
+    others, a solid is nearer than a patch is wide to what it stands on: the light caught in between, little and in
+    the dark, is not resolved there. And every point meets every patch: a solid of revolution makes that slow.
     """
+    if not tolerance > 0:
+        raise ValueError(f"tolerance must be a positive share of the direct irradiance; found {tolerance}.")
     if solid.convex:
         return points.new_zeros(1, len(points), 1)
     exchange = _exchange(solid, patches)
@@ -70,7 +75,7 @@ def bounced(
     while True:
         arrived = exchange.carry(left[-1])
         if arrived.detach().max() * (once + twice) / (1 - twice) <= tolerance * direct.detach().max():
-            return exchange.arriving(torch.stack(left), points, normals).to(points.dtype)
+            return exchange.arriving(torch.stack(left), points.cpu(), normals.cpu()).to(points)
         left.append(arrived)
 
 
@@ -82,7 +87,7 @@ def sky_share(solid: Solid, points: Tensor, normals: Tensor, *, patches: int | N
     """
     if solid.convex:
         return points.new_ones(len(points))
-    return (1 - _exchange(solid, patches).share_at(points, normals)).to(points.dtype)
+    return (1 - _exchange(solid, patches).share_at(points.cpu(), normals.cpu())).to(points)
 
 
 def direct_irradiance(exchange: Exchange, lights: Sequence[Light]) -> Tensor:
@@ -104,6 +109,8 @@ def direct_irradiance(exchange: Exchange, lights: Sequence[Light]) -> Tensor:
 
 @lru_cache(maxsize=4)
 def _exchange(solid: Solid, patches: int | None) -> Exchange:
+    if patches is not None and not (isinstance(patches, int) and patches >= 9):
+        raise ValueError(f"patches must be a whole number of at least 9; found {patches!r}.")
     if isinstance(solid, Revolution):
         return RingExchange(solid, round(math.sqrt(patches or _PATCHES)))
     return PairExchange(solid, solid.patches(patches or _PAIRED_PATCHES))

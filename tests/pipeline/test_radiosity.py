@@ -76,6 +76,17 @@ def test_two_facing_squares(apart):
     assert factors.sum(-1).mean().item() == pytest.approx(expected, rel=0.01)
 
 
+def test_a_disc_straight_ahead_takes_no_more_than_the_sky():
+    """A disc of radius R at height h takes R^2/(R^2 + h^2), and small patches aside cos cos' A/(pi r^2)."""
+    up = torch.tensor([[0.0, 1.0, 0.0]], dtype=D)
+    for height in (1e-6, 0.1, 1.0, 10.0):
+        disc = Patches(height * up, -up, torch.tensor([math.pi * 0.3**2], dtype=D))
+        expected = 0.09 / (0.09 + height**2)
+        assert form_factors(0 * up, up, disc, None).item() == pytest.approx(expected, rel=1e-12)
+    aside = Patches(torch.tensor([[3.0, 4.0, 0.0]], dtype=D), torch.tensor([[-1.0, 0, 0]], dtype=D), up[0, 1:2] * 1e-6)
+    assert form_factors(0 * up, up, aside, None).item() == pytest.approx(0.8 * 0.6e-6 / (25 * math.pi), rel=1e-6)
+
+
 RADIUS, ABOVE = 0.3, 0.5
 SCENE = Group((Sphere(RADIUS, (0.0, ABOVE, 0.0)), Plane((0.0, 1.0, 0.0))))
 
@@ -177,6 +188,21 @@ def test_patches_have_the_surface_of_their_solid():
 # --- what the caller may ask -------------------------------------------------------------------------------
 
 
+def test_a_plane_takes_part_far_out():
+    """In a disc of 1000 half sizes under the middle of what stands on it."""
+    points, normals, areas = Plane((0.0, 0.6, 0.8), (0.0, 1.0, 0.0)).patches_below(
+        Sphere(0.5).patches(2000).points, 300
+    )
+    assert areas.sum().item() == pytest.approx(math.pi * 500**2, rel=0.01)
+    assert ((points - torch.tensor([0.0, 1.0, 0.0], dtype=D)) @ normals[0]).abs().max() < 1e-9
+    middle = 0.6 * normals[0]  # the plane's point nearest to the sphere's centre
+    distances = (points - middle).norm(dim=-1)
+    assert distances.min() < 0.2
+    torch.testing.assert_close(
+        areas.cumsum(0)[-2], math.pi * ((distances[-1] + distances[-2]) / 2) ** 2, rtol=0.02, atol=0
+    )
+
+
 def test_convex_solids_take_no_work():
     points, normals = ball([0.1])
     assert torch.equal(bounced(Sphere(), [Ambient()], points, normals), torch.zeros(1, 1, 1, dtype=D))
@@ -241,6 +267,10 @@ def test_refusals():
     points, normals = ball([0.1])
     with pytest.raises(ValueError, match="HeightField has no patches"):
         bounced(HeightField(torch.ones(4, 4)), [Ambient()], points, normals)
+    with pytest.raises(ValueError, match="tolerance must be a positive share .* found 0"):
+        bounced(SCENE, [Ambient()], points, normals, tolerance=0.0)
+    with pytest.raises(ValueError, match="patches must be a whole number of at least 9; found 1.5"):
+        bounced(SCENE, [Ambient()], points, normals, patches=1.5)  # pyright: ignore[reportArgumentType]
     with pytest.raises(ValueError, match="found planes only"):
         bounced(Group((Plane(), Plane((0, 1, 0)))), [Ambient()], points, normals)
 
