@@ -57,10 +57,10 @@ def bounced(
             64^2, 96^2, 128^2 and 160^2 patches, a tenth of that in the mean square, most at the groove of its foot.
     Returns: zeros of one bounce for a convex solid, without any work.
     Raises: ValueError for a solid whose extent is unknown, or patches so coarse that q >= 1; a tolerance that
-        is not positive.
-    The geometry is remembered for the last few solids, on the CPU. Differentiable in the lights' strengths. Among
-    others, a solid is nearer than a patch is wide to what it stands on: the light caught in between, little and in
-    the dark, is not resolved there. And every point meets every patch: a solid of revolution makes that slow.
+        is not positive; fewer than 9 patches.
+    The geometry is remembered for the last few solids, on the CPU. Differentiable in the lights' strengths.
+    Where two bodies come nearer to each other than a patch is wide, as around a point of contact, the light caught
+    between them is not resolved. In a group every point meets every patch, which is slow with a solid of revolution.
     """
     if not tolerance > 0:
         raise ValueError(f"tolerance must be a positive share of the direct irradiance; found {tolerance}.")

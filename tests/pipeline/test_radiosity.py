@@ -1,6 +1,5 @@
-"""Light between the parts of an object, against closed forms and a path tracer that shares no code with it."""
+"""Light between the parts of an object, against closed forms and laws."""
 
-import itertools
 import math
 
 import numpy as np
@@ -190,17 +189,16 @@ def test_patches_have_the_surface_of_their_solid():
 
 def test_a_plane_takes_part_far_out():
     """In a disc of 1000 half sizes under the middle of what stands on it."""
-    points, normals, areas = Plane((0.0, 0.6, 0.8), (0.0, 1.0, 0.0)).patches_below(
-        Sphere(0.5).patches(2000).points, 300
-    )
+    above = Sphere(0.5).patches(2000).points
+    points, normals, areas = Plane((0.0, 0.6, 0.8), (0.0, 1.0, 0.0)).patches_below(above, 300)
     assert areas.sum().item() == pytest.approx(math.pi * 500**2, rel=0.01)
     assert ((points - torch.tensor([0.0, 1.0, 0.0], dtype=D)) @ normals[0]).abs().max() < 1e-9
     middle = 0.6 * normals[0]  # the plane's point nearest to the sphere's centre
     distances = (points - middle).norm(dim=-1)
     assert distances.min() < 0.2
-    torch.testing.assert_close(
-        areas.cumsum(0)[-2], math.pi * ((distances[-1] + distances[-2]) / 2) ** 2, rtol=0.02, atol=0
-    )
+    # all patches but the last reach half way between the last two
+    reached = (distances[-1] + distances[-2]).item() / 2
+    assert areas[:-1].sum().item() == pytest.approx(math.pi * reached**2, rel=0.02)
 
 
 def test_convex_solids_take_no_work():
@@ -267,87 +265,9 @@ def test_refusals():
     points, normals = ball([0.1])
     with pytest.raises(ValueError, match="HeightField has no patches"):
         bounced(HeightField(torch.ones(4, 4)), [Ambient()], points, normals)
-    with pytest.raises(ValueError, match="tolerance must be a positive share .* found 0"):
+    with pytest.raises(ValueError, match="tolerance must be a positive share of the direct irradiance; found 0"):
         bounced(SCENE, [Ambient()], points, normals, tolerance=0.0)
-    with pytest.raises(ValueError, match="patches must be a whole number of at least 9; found 1.5"):
+    with pytest.raises(ValueError, match=r"patches must be a whole number of at least 9; found 1\.5"):
         bounced(SCENE, [Ambient()], points, normals, patches=1.5)  # pyright: ignore[reportArgumentType]
     with pytest.raises(ValueError, match="found planes only"):
         bounced(Group((Plane(), Plane((0, 1, 0)))), [Ambient()], points, normals)
-
-
-# --- the path tracer: numpy, and nothing but the profile ---------------------------------------------------
-
-
-class Tracer:
-    """Paths between white Lambert walls of the vase; crossings by marching and bisection."""
-
-    def __init__(self):
-        self.profile, self.rng = vase_profile(), np.random.default_rng(0)
-        heights = np.linspace(-0.92, 0.92, 20001)
-        self.heights, self.radii = heights, self.profile(heights)
-
-    def inside(self, p):
-        radius = np.interp(p[..., 1], self.heights, self.radii, left=0.0, right=0.0)
-        return p[..., 0] ** 2 + p[..., 2] ** 2 < radius**2
-
-    def first_hit(self, p, d):
-        """Distance to where rays from outside enter; inf where they leave."""
-        result, left = np.full(len(p), np.inf), np.arange(len(p))
-        tried = np.concatenate((np.arange(0, 0.12, 0.004), np.geomspace(0.12, 2.0, 100)))
-        for before, after in itertools.pairwise(tried):
-            q = p[left] + after * d[left]
-            entered = self.inside(q)
-            low, high = np.full(entered.sum(), before), np.full(entered.sum(), after)
-            rays = left[entered]
-            for _ in range(30):
-                mid = (low + high) / 2
-                deep = self.inside(p[rays] + mid[:, None] * d[rays])
-                low, high = np.where(deep, low, mid), np.where(deep, mid, high)
-            result[rays] = high
-            left = left[~entered & (np.abs(q[:, 1]) < 0.92) & (np.hypot(q[:, 0], q[:, 2]) < 0.6)]
-        return result
-
-    def normal(self, p):
-        slope = self.profile(np.clip(p[:, 1], -0.92, 0.92), 1)
-        n = np.stack((p[:, 0], -np.hypot(p[:, 0], p[:, 2]) * slope, p[:, 2]), -1)
-        return n / np.linalg.norm(n, axis=-1, keepdims=True)
-
-    def bounce(self, n, samples):
-        """Directions about unit normals with density cos/pi."""
-        share, turn = self.rng.random(samples), 2 * np.pi * self.rng.random(samples)
-        other = np.where(np.abs(n[:, :1]) < 0.6, [[1.0, 0, 0]], [[0, 1.0, 0]])
-        u = np.cross(n, other)
-        u /= np.linalg.norm(u, axis=-1, keepdims=True)
-        flat = np.sqrt(share)[:, None] * (np.cos(turn)[:, None] * u + np.sin(turn)[:, None] * np.cross(n, u))
-        return flat + np.sqrt(1 - share)[:, None] * n
-
-    def irradiance(self, p, n, lights, bounces, samples):
-        """Means and standard errors (light, bounce) of E at the ends of paths of 1, 2, ... segments from one point."""
-        p, n = np.repeat(p[None], samples, 0), np.repeat(n[None], samples, 0)
-        alive, values = np.arange(samples), np.zeros((len(lights), bounces, samples))
-        for b in range(bounces):
-            d = self.bounce(n, len(p))
-            start = p + 1e-5 * n
-            t = self.first_hit(start, d)
-            met = np.isfinite(t)
-            alive, p = alive[met], start[met] + t[met, None] * d[met]
-            n = self.normal(p)
-            for k, light in enumerate(lights):
-                lit = np.isinf(self.first_hit(p + 1e-5 * n, np.repeat(light[None], len(p), 0)))
-                values[k, b, alive] = np.clip(n @ light, 0, None) * lit
-        return values.mean(-1), values.std(-1) / math.sqrt(samples)
-
-
-@pytest.mark.parametrize("samples", [20_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
-def test_vase_as_traced(samples):
-    """One and two bounces of a level and a raised light at lip, neck and foot: 3 standard errors and 2 % allowed."""
-    solid, points, normals = on_vase([0.88, 0.68, -0.75], [0.1, -0.8, 1.2])
-    lights = [np.array(k) / np.linalg.norm(k) for k in ((0.3, 0.0, 0.954), (0.2, 0.85, 0.487))]
-    got = [bounced(solid, [Distant(torch.from_numpy(light))], points, normals)[:2, :, 0].numpy() for light in lights]
-    tracer = Tracer()
-    for k in range(len(points)):
-        means, errors = tracer.irradiance(points[k].numpy(), normals[k].numpy(), lights, 2, samples)
-        assert means[0, 0] > 0.02
-        for light in range(2):
-            allowed = 3 * errors[light] + 0.02 * means[:, 0].max()
-            assert (np.abs(got[light][:, k] - means[light]) < allowed).all()
