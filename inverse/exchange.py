@@ -1,6 +1,7 @@
 """Which patches of a surface light which, and how strongly: the kernel of diffuse interreflection."""
 
 import math
+from collections.abc import Iterator
 from typing import Protocol
 
 import torch
@@ -46,7 +47,7 @@ class PairExchange(Exchange):
 
     def __init__(self, solid: Solid | None, patches: Patches):
         self.solid, self.patches = solid, patches
-        self._factors = form_factors(patches.points, patches.normals, patches, solid)
+        self._factors = torch.cat(list(self._pieces(patches.points, patches.normals)))
         self.share = self._factors.sum(-1)
 
     def carry(self, exitance: Tensor) -> Tensor:
@@ -58,7 +59,8 @@ class PairExchange(Exchange):
     def share_at(self, points: Tensor, normals: Tensor) -> Tensor:
         return torch.cat([factors.sum(-1) for factors in self._pieces(points, normals)])
 
-    def _pieces(self, points: Tensor, normals: Tensor):
+    def _pieces(self, points: Tensor, normals: Tensor) -> Iterator[Tensor]:
+        """Form factors (some points, patch), piece by piece."""
         size = max(1, _PAIRS // len(self.patches.areas))
         for piece in zip(points.double().split(size), normals.double().split(size), strict=True):
             yield form_factors(*piece, self.patches, self.solid)
@@ -69,12 +71,12 @@ class RingExchange(Exchange):
 
     The kernel depends on two heights and the difference of two azimuths, so it is computed for one azimuth only and
     applied as a product of Fourier series. Points take the irradiance of the patches around them, linear in
-    height and azimuth; within half a patch of an end, that of the last ring. The flat ends see nothing of the solid.
+    height and azimuth; within half a patch of an end, that of the last ring. The flat ends see nothing of the solid
+    and are left out.
     """
 
-    def __init__(self, solid: Revolution, count: int):
-        self.solid, self.patches, self._on_end = solid, solid.patches(count), solid.on_end
-        rings = math.isqrt(len(self.patches.areas))
+    def __init__(self, solid: Revolution, rings: int):
+        self.solid, self.patches, self._on_end = solid, solid.wall(rings), solid.on_end
         # as seen from azimuth 0 both sides are alike
         half = [k.unflatten(0, (rings, rings))[:, : rings // 2 + 1] for k in self.patches]
         here = [k[:, 0] for k in half]

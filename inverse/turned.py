@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from inverse.patches import Patches
+from inverse.patches import Patches, disc, joined
 from inverse.solids import Body, box, row
 
 # Smallest height that a ray climbs a unit of length: a level ray is taken as one that climbs this much,
@@ -70,43 +70,63 @@ class Revolution(Body):
 
     def blocks(self, origin: Tensor, direction: Tensor, reach: Tensor | float = math.inf) -> Tensor:
         """By height, as a ray climbs or falls steadily: between two heights the squared distance from the axis is a
-        parabola, which is below the straight r(y)^2 somewhere or nowhere. No dip between two trials is missed.
+        parabola, which is below the straight r(y)^2 somewhere or nowhere: however level a ray, it skips nothing.
         """
         origin, direction = torch.broadcast_tensors(origin.double(), direction.double())
         start, along = origin.reshape(-1, 3), direction.reshape(-1, 3)
         reach = torch.as_tensor(reach).to(start).expand(origin.shape[:-1]).reshape(-1)
         blocked = torch.zeros(len(start), dtype=torch.bool, device=start.device)
+        enter, leave = self._box(start, along)
+        enter, leave = enter.clamp(min=0), torch.minimum(leave, reach)
         rising = along[:, 1] >= 0
-        for rays, flip in ((rising.nonzero()[:, 0], False), ((~rising).nonzero()[:, 0], True)):
+        for same_way, flip in ((rising, False), (~rising, True)):
+            rays = (same_way & (enter < leave)).nonzero()[:, 0]
             if len(rays):
-                blocked[rays] = self._climb(start[rays], along[rays], reach[rays], flip)
+                span = enter[rays], leave[rays]
+                blocked[rays] = self._climb(start[rays], along[rays], reach[rays], span, flip)
         return blocked.reshape(origin.shape[:-1])
 
-    def rings(self, count: int) -> tuple[Tensor, Tensor, Tensor]:
-        """`count` rings of the wall, as high as each other along the profile: middle heights, radii there and areas."""
+    def wall(self, rings: int) -> Patches:
+        """The surface between the ends in `rings` rings of `rings` patches, ring by ring from the lower end.
+
+        The rings are as high as each other along the profile; their first patches lie at azimuth 0, towards +z.
+        """
         fine = np.linspace(self.low, self.high, 16 * self.steps)
         length = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(fine), np.diff(self.radius(fine))))))
-        edges = np.interp(np.linspace(0, length[-1], 2 * count + 1), length, fine)
-        r = self.radius(edges)
-        middles, ends = edges[1::2], slice(None, None, 2)
-        areas = np.pi * (r[ends][1:] + r[ends][:-1]) * np.hypot(np.diff(r[ends]), np.diff(edges[ends]))
-        return torch.from_numpy(middles), torch.from_numpy(r[1::2]), torch.from_numpy(areas)
+        heights = np.interp(np.linspace(0, length[-1], 2 * rings + 1), length, fine)
+        r = self.radius(heights)
+        areas = np.pi * (r[2::2] + r[:-1:2]) * np.hypot(np.diff(r[::2]), np.diff(heights[::2]))  # frustums
+        turn = np.arange(rings) * (2 * np.pi / rings)
+        x, z = np.outer(r[1::2], np.sin(turn)), np.outer(r[1::2], np.cos(turn))
+        y = np.broadcast_to(heights[1::2, None], x.shape)
+        points = torch.from_numpy(np.stack((x, y, z), -1).reshape(-1, 3))
+        return Patches(points, self.normal(points), torch.from_numpy(np.repeat(areas / rings, rings)))
 
     def patches(self, count: int) -> Patches:
-        """Rings, each in as many parts as there are rings, ring by ring from the lower end; the ends are left out:
-        nothing of the solid is in front of them, and the other surface does not see them.
-        """
-        heights, r, areas = self.rings(round(math.sqrt(count)))
-        turn = (torch.arange(len(r), dtype=torch.float64)) * (2 * math.pi / len(r))
-        x, z = r[:, None] * turn.sin(), r[:, None] * turn.cos()
-        points = torch.stack((x, heights[:, None].expand(x.shape), z), -1).flatten(0, 1)
-        return Patches(points, self.normal(points), (areas / len(r)).repeat_interleave(len(r)))
+        wall = self.wall(round(math.sqrt(count)))
+        pieces = [wall]
+        for height, up in ((self.low, -1.0), (self.high, 1.0)):
+            r = float(self.radius(np.array([height]))[0])
+            x, z, areas = disc(math.ceil(math.pi * r * r / wall.areas.mean().item()), r)
+            points = torch.stack((x, torch.full_like(x, height), z), -1)
+            pieces.append(Patches(points, row((0.0, up, 0.0), x).expand(points.shape), areas))
+        return joined(pieces)
 
     def _radii(self, heights: Tensor) -> Tensor:
         return torch.as_tensor(self.radius(heights.clamp(self.low, self.high).cpu().numpy())).to(heights)
 
-    def _climb(self, origin: Tensor, direction: Tensor, reach: Tensor, flip: bool) -> Tensor:
-        """`blocks` (ray,) for rays that all climb, or with `flip` all fall (the solid is turned over for them)."""
+    def _box(self, origin: Tensor, direction: Tensor) -> tuple[Tensor, Tensor]:
+        """Where rays enter and leave the box around the solid, each (ray,)."""
+        widest = self.widest()
+        sizes = row((widest, (self.high - self.low) / 2, widest), origin)
+        return box(origin - row((0.0, (self.low + self.high) / 2, 0.0), origin), direction, sizes)
+
+    def _climb(
+        self, origin: Tensor, direction: Tensor, reach: Tensor, span: tuple[Tensor, Tensor], flip: bool
+    ) -> Tensor:
+        """`blocks` (ray,) between two distances, for rays that all climb, or with `flip` all fall (the solid is turned
+        over for them)."""
+        enter, leave = span
         nodes = torch.linspace(self.low, self.high, self.steps + 1, dtype=torch.float64, device=origin.device)
         squared = self._radii(nodes).square()
         level, rise = origin[:, 1], direction[:, 1].abs().clamp(min=_LEVEL)
@@ -114,9 +134,6 @@ class Revolution(Body):
         own, end_squared = self._radii(level).square(), self._radii(end).square()
         if flip:
             nodes, squared, level, end = -nodes.flip(0), squared.flip(0), -level, -end
-        sizes = row((self.widest(), (self.high - self.low) / 2, self.widest()), origin)
-        enter, leave = box(origin - row((0.0, (self.low + self.high) / 2, 0.0), origin), direction, sizes)
-        enter, leave = enter.clamp(min=0), torch.minimum(leave, reach)
         flat = row((1.0, 0.0, 1.0), origin)
         a, b, c = (k.sum(-1) for k in ((origin * flat) ** 2, origin * direction * flat, (direction * flat) ** 2))
         blocked = torch.zeros_like(level, dtype=torch.bool)
@@ -138,9 +155,7 @@ class Revolution(Body):
 
     def _march(self, origin: Tensor, direction: Tensor) -> Tensor:
         """First crossing (ray,) from outside to inside, by `steps` trials and then by bisection."""
-        middle, half, widest = (self.low + self.high) / 2, (self.high - self.low) / 2, self.widest()
-        sizes = row((widest, half, widest), origin)
-        start, beyond = box(origin - row((0.0, middle, 0.0), origin), direction, sizes)
+        start, beyond = self._box(origin, direction)
         start = start.clamp(min=0.0)
         rays = (start < beyond).nonzero()[:, 0]
         result = torch.full_like(start, torch.inf)
