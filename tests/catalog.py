@@ -26,6 +26,7 @@ from torchbrdf import (
     FastRoughSurface,
     FujiiOrenNayar,
     Hapke,
+    HeTorrance,
     Lambert,
     LambertSphere,
     LommelSeeliger,
@@ -295,6 +296,32 @@ OTHERS = [
         ),
         nodes=64,
         albedo_error=5e-3,
+        float32=STEEP_LOBE,
+    ),
+    Model(
+        "he_torrance, aluminium",  # Figure 8; the specular part matters at grazing alone
+        lambda dtype: HeTorrance(
+            sigma0=number(0.28, dtype),
+            tau=number(1.77, dtype),
+            wavelength=torch.tensor([0.65, 0.5], dtype=dtype),
+            eta=torch.tensor([1.49, 0.77], dtype=dtype),
+            k=torch.tensor([7.82, 6.08], dtype=dtype),
+        ),
+        nodes=96,
+        float32=STEEP_LOBE,
+    ),
+    Model(
+        "he_torrance, plastic, spike",
+        lambda dtype: HeTorrance(
+            sigma0=number(0.05, dtype),
+            tau=number(0.7, dtype),
+            wavelength=fixed(number(0.55, dtype)),
+            eta=number(1.5, dtype),
+            diffuse=colour(dtype),
+            solid_angle=0.1,
+        ),
+        nodes=128,
+        albedo_error=2e-2,
         float32=STEEP_LOBE,
     ),
     Model(

@@ -26,6 +26,7 @@ from torchbrdf.fresnel import (
     Perfect,
     Schlick,
     conductor,
+    conductor_amplitudes,
     dielectric,
     dielectric_average,
     f0_from_index,
@@ -44,6 +45,18 @@ from torchbrdf.models.ashikhmin_shirley import (
 from torchbrdf.models.burley import (
     Burley,
     burley,
+)
+from torchbrdf.models.he_torrance.functional import (
+    he_torrance,
+    specular_reflectivity,
+)
+from torchbrdf.models.he_torrance.module import (
+    HeTorrance,
+)
+from torchbrdf.models.he_torrance.polarised import (
+    coherency,
+    he_torrance_polarised,
+    polarised_specular_reflectivity,
 )
 from torchbrdf.models.lambert import (
     Lambert,
@@ -117,6 +130,18 @@ from torchbrdf.models.torrance_sparrow import (
     TorranceSparrow,
     torrance_sparrow,
 )
+from torchbrdf.optical_constants import (
+    ACRYLIC,
+    ALUMINIUM,
+    COPPER,
+    CROWN_GLASS,
+    FUSED_SILICA,
+    GOLD,
+    MAGNESIUM_OXIDE,
+    SILVER,
+    MeasuredIndex,
+    SellmeierIndex,
+)
 from torchbrdf.parameters import (
     Constrained,
     Interval,
@@ -139,6 +164,8 @@ from torchbrdf.slopes import (
 )
 
 __all__ = [  # noqa: RUF022 - in plain order
+    "ACRYLIC",
+    "ALUMINIUM",
     "AnisotropicBeckmann",
     "AnisotropicGGX",
     "AnisotropicRoughSurface",
@@ -146,6 +173,8 @@ __all__ = [  # noqa: RUF022 - in plain order
     "BRDF",
     "Beckmann",
     "Burley",
+    "COPPER",
+    "CROWN_GLASS",
     "ClosedFormRoughSurface",
     "ClosedFormVCavities",
     "Conductor",
@@ -155,19 +184,24 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Dampened",
     "Dielectric",
     "EON",
+    "FUSED_SILICA",
     "FastRoughSurface",
     "Fresnel",
     "FujiiOrenNayar",
     "GGX",
+    "GOLD",
     "HalfVector",
     "Hapke",
+    "HeTorrance",
     "ImageBRDF",
     "Interval",
     "Lambert",
     "LambertSphere",
     "LinearBRDF",
     "LommelSeeliger",
+    "MAGNESIUM_OXIDE",
     "MaxCosinePhong",
+    "MeasuredIndex",
     "Minnaert",
     "Mirror",
     "ModifiedPhong",
@@ -177,8 +211,10 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Phong",
     "QualitativeOrenNayar",
     "RoughSurface",
+    "SILVER",
     "Sample",
     "Schlick",
+    "SellmeierIndex",
     "Simplex",
     "SingleSlopeVCavities",
     "TabulatedBRDF",
@@ -187,7 +223,9 @@ __all__ = [  # noqa: RUF022 - in plain order
     "UnidirectionalVCavities",
     "WeightedSum",
     "burley",
+    "coherency",
     "conductor",
+    "conductor_amplitudes",
     "dielectric",
     "dielectric_average",
     "eon_albedo_from_directional",
@@ -196,11 +234,14 @@ __all__ = [  # noqa: RUF022 - in plain order
     "fast_rough_surface",
     "fixed",
     "gaussian_weights",
+    "he_torrance",
+    "he_torrance_polarised",
     "is_per_texel",
     "lambert_sphere_fast",
     "minnaert",
     "oren_nayar",
     "phong_radiance",
+    "polarised_specular_reflectivity",
     "qualitative",
     "rusinkiewicz_angles",
     "sample_slope",
@@ -211,6 +252,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "sigma_from_mean_slope",
     "smith_correlated",
     "smith_separable",
+    "specular_reflectivity",
     "tabulated_weights",
     "torrance_sparrow",
     "trainable",

@@ -72,9 +72,7 @@ def he_torrance(
         reflector (both parts) returns 1.022 of the light from 86 degrees and 0.44 at 89; nothing is clamped.
     Source: He, Torrance, Sillion & Greenberg 1991, eqs. (4)-(9), (71)-(83).
     """
-    check_surface(
-        "he_torrance", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k, diffuse=diffuse
-    )
+    check_surface("he_torrance", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k, diffuse=diffuse)
     lobe = directional_diffuse(cosines, sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
     return cosines.zero_below_horizon(lobe + uniform_diffuse(lobe, diffuse))
 

@@ -50,7 +50,8 @@ def he_torrance_polarised(
 ) -> Tensor:
     r"""`he_torrance` for light of any polarisation.
 
-    .. math:: C_{out} = \frac{G S D}{\pi \cos\theta_i \cos\theta_r} J C_{in} J^H + \frac{a}{\pi} \frac{\mathrm{tr} C_{in}}{2} 1
+    .. math::
+        C_{out} = \frac{G S D}{\pi \cos\theta_i \cos\theta_r} J C_{in} J^H + \frac{a}{2\pi} (\mathrm{tr}\, C_{in})\, 1
 
     Args:
         normal, light, view: unit vectors (..., 3) that leave the surface.
@@ -66,9 +67,7 @@ def he_torrance_polarised(
     Deviations: as `he_torrance`. The uniform-diffuse part leaves unpolarised, half s and half p.
     Source: He et al. 1991, eqs. (59)-(68), with the signs of (63), (64) repaired.
     """
-    check_surface(
-        "he_torrance_polarised", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k, diffuse=diffuse
-    )
+    check_surface("he_torrance_polarised", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k, diffuse=diffuse)
     cosines = Cosines.of(normal, light, view)
     geometry = Geometry.of(cosines)
     surface = {"sigma0": sigma0[..., None], "tau": tau[..., None], "wavelength": torch.atleast_1d(wavelength)}
