@@ -29,7 +29,7 @@ from torchbrdf.models.he_torrance.sampling import (
     spike_density,
     spike_light,
 )
-from torchbrdf.models.he_torrance.spike import averaged_spike, check_solid_angle
+from torchbrdf.models.he_torrance.spike import averaged_spike, check_solid_angle, spike_albedo
 from torchbrdf.parameters import ABSORPTION_INDEX, ALBEDO, Constrained, fixed, is_per_texel
 from torchbrdf.sampling import choose, cosine_hemisphere
 
@@ -123,7 +123,7 @@ class HeTorrance(BRDF):
 
         Closed form but for the lobe: its quadrature follows its width. For alpha = 2 sigma0/tau from 2e-5 to 9 and
         angles up to 89.9 degrees the error is below 1e-7 with 32 nodes, 1e-4 with 16. A spike of finite solid angle
-        counts as its delta lobe: the difference is of the order of that angle, and at grazing what the horizon cuts.
+        is integrated too: what the horizon cuts of it is missing.
         """
         surface = self._surface_albedo(cos_view, nodes)
         return surface + torch.atleast_1d(self.diffuse) if self._matte else surface
@@ -213,8 +213,10 @@ class HeTorrance(BRDF):
     def _surface_albedo(self, cos: Tensor, nodes: int) -> Tensor:
         """What the parts of the surface included reflect of light from a cosine (...): (..., channel)."""
         total = self._dark(cos)
-        if self._specular:
+        if self._specular and self.solid_angle is None:
             total = total + self.specular_reflectivity(cos)
+        elif self._specular and self.solid_angle is not None:
+            total = total + spike_albedo(cos, solid_angle=self.solid_angle, nodes=nodes, **self._surface())
         if self._lobe:
             total = total + lobe_albedo(cos, nodes=nodes, **self._surface())
         return total

@@ -63,24 +63,24 @@ def lobe_density(cosines: Cosines, narrow: Tensor, wide: Tensor) -> Tensor:
 
 
 def spike_light(view: Tensor, solid_angle: float, u: Tensor) -> Tensor:
-    """Light (..., 3), uniform where the spike of cones of this solid angle [sr] is not 0, from u (..., 2)."""
+    """Light (..., 3) about the mirror direction, where the spike of cones of this solid angle [sr] is not 0."""
     image = view * view.new_tensor([-1.0, -1.0, 1.0])
-    flat = _wide(solid_angle) / (2 * math.pi) * u[..., 0]  # 1 - cos
+    flat = _widest(solid_angle) * (1 - (1 - u[..., 0]).sqrt())  # 1 - cos(gamma)
     sine, turn = (flat * (2 - flat)).sqrt(), 2 * math.pi * u[..., 1]
     around = torch.stack((sine * turn.cos(), sine * turn.sin(), 1 - flat), -1)
     return towards(image, around.expand(torch.broadcast_shapes(around.shape, image.shape)))
 
 
 def spike_density(cosines: Cosines, solid_angle: float) -> Tensor:
-    """Density (...) of `spike_light`. [1/sr]"""
+    """Density (...) of `spike_light`: falls linearly with 1 - cos(gamma) to 0 at the rim of the spike. [1/sr]"""
     geometry = Geometry.of(cosines)
     difference = geometry.cos_light - geometry.cos_view
-    half_sine_squared = ((geometry.planar + difference * difference) / 4)[..., 0]
-    wide = _wide(solid_angle)
-    return (half_sine_squared < wide / (4 * math.pi)).to(half_sine_squared) / wide
+    flat = (geometry.planar + difference * difference)[..., 0] / 2
+    widest = _widest(solid_angle)
+    return (1 - flat / widest).relu() / (math.pi * widest)
 
 
-def _wide(solid_angle: float) -> float:
-    """Solid angle of a cone of twice the half-angle. [sr]"""
+def _widest(solid_angle: float) -> float:
+    """1 - cos(2 alpha) for a cone of half-angle alpha. [-]"""
     flat = solid_angle / (2 * math.pi)
-    return 4 * math.pi * flat * (2 - flat)
+    return 2 * flat * (2 - flat)

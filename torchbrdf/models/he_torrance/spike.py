@@ -21,6 +21,7 @@ from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
 from torchbrdf.models.he_torrance.functional import mirror_reflectance
 from torchbrdf.models.he_torrance.lobe import Geometry
+from torchbrdf.quadrature import gauss_legendre
 
 # Solid angles of cones: from one that float32 cannot tell from a delta lobe to a quarter of the hemisphere. [sr]
 NARROWEST_CONE, WIDEST_CONE = 1e-9, math.pi / 2
@@ -73,9 +74,45 @@ def averaged_spike(
     difference = geometry.cos_light - geometry.cos_view
     # the chord between view and mirrored light, over 2, squared
     half_sine_squared = (geometry.planar + difference * difference) / 4
+    surface = {"sigma0": sigma0, "tau": tau, "wavelength": wavelength, "eta": eta, "k": k}
+    return _spike(geometry.cos_light + geometry.cos_view, half_sine_squared, solid_angle, surface)
+
+
+def spike_albedo(
+    cos_view: Tensor,
+    *,
+    solid_angle: float,
+    sigma0: Tensor,
+    tau: Tensor,
+    wavelength: Tensor,
+    eta: Tensor,
+    k: Tensor,
+    nodes: int,
+) -> Tensor:
+    """Share of light from `cos_view` (...) that the averaged spike returns above the horizon (..., channel). [-]
+
+    `nodes` angles from the mirror direction times as many azimuths, each up to the rim or to the horizon.
+    """
+    c = cos_view[..., None]
+    s = safe_sqrt((1 - c) * (1 + c))
+    x, weight = gauss_legendre(nodes, c)
+    column = (nodes, *(1,) * c.ndim)
+    phi, phi_weight = (math.pi * x).reshape(column), (2 * math.pi * weight).reshape(column)
+    x, weight = x.reshape(nodes, 1, *column[1:]), weight.reshape(nodes, 1, *column[1:])
+    rim = 2 * math.acos(1 - solid_angle / (2 * math.pi))
+    downward = -s * phi.cos()
+    end = torch.atan2(c.expand_as(downward), downward).clamp(max=rim)
+    gamma = end * x
+    cos_light = c * gamma.cos() - downward * gamma.sin()
+    surface = {"sigma0": sigma0, "tau": tau, "wavelength": wavelength, "eta": eta, "k": k}
+    f = _spike(c + cos_light, (gamma / 2).sin() ** 2, solid_angle, surface)
+    return (f * (cos_light * gamma.sin() * end * weight * phi_weight)).sum((0, 1))
+
+
+def _spike(up: Tensor, half_sine_squared: Tensor, solid_angle: float, surface: dict[str, Tensor]) -> Tensor:
+    """The averaged spike from the sum of the cosines and from sin^2(gamma/2), each (..., 1)."""
     share = cone_overlap(half_sine_squared, solid_angle)
     near = share > 0
-    up = (geometry.cos_light + geometry.cos_view) / 2
-    middle = torch.where(near, up / (1 - half_sine_squared.masked_fill(~near, 0.0)).sqrt(), torch.ones_like(up))
-    reflected = mirror_reflectance(middle[..., 0], sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
-    return reflected * (share / (middle * solid_angle))
+    halfway = up / 2 / (1 - half_sine_squared.masked_fill(~near, 0.0)).sqrt()
+    middle = torch.where(near, halfway, torch.ones_like(up))
+    return mirror_reflectance(middle[..., 0], **surface) * (share / (middle * solid_angle))
