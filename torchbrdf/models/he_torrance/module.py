@@ -122,7 +122,7 @@ class HeTorrance(BRDF):
         """Directional-hemispherical reflectance (..., channel) of the parts included, the delta lobe too. [-]
 
         Closed form but for the lobe: its quadrature follows its width. For alpha = 2 sigma0/tau from 2e-5 to 9 and
-        angles up to 89.9 degrees the error is below 1e-7 with 32 nodes, 1e-4 with 16. A spike of finite solid angle
+        angles up to 89.9 degrees the error is below 2e-7 with 32 nodes, 1e-4 with 16. A spike of finite solid angle
         is integrated too: what the horizon cuts of it is missing.
         """
         surface = self._surface_albedo(cos_view, nodes)
