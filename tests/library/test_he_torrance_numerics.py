@@ -33,11 +33,10 @@ def test_derivatives(parameters):
     # with respect to everything, at random and in the directions where formulas change
     surface = {name: value.requires_grad_() for name, value in material(*parameters).items()}
     generator = torch.Generator().manual_seed(0)
-    vectors = [v.requires_grad_() for v in random_directions(4, dtype=torch.float64, generator=generator)]
+    vectors = [v.requires_grad_() for v in random_directions(2, dtype=torch.float64, generator=generator)]
 
     def f(normal, light, view, diffuse, *values):
         cosines = Cosines.of(normal, light, view, normalize=True)
-        # relative to itself, so that far tails are tested too
         return he_torrance(cosines, diffuse=diffuse, **dict(zip(surface, values, strict=True)))
 
     inputs = (*vectors, doubles([0.2]).requires_grad_(), *surface.values())
@@ -192,4 +191,4 @@ def test_shapes():
         alone = he_torrance(one, diffuse=doubles(0.1), **{n: v[i] for n, v in per_pixel.items()}, **channels)
         assert_close(together[i], alone, rtol=1e-13, atol=0)
     model = HeTorrance(**{n: fixed(v) for n, v in (per_pixel | channels).items()})
-    assert model.directional_albedo(doubles([0.5] * 6)).shape == (6, 3)
+    assert model.directional_albedo(doubles([0.5] * 6), nodes=8).shape == (6, 3)

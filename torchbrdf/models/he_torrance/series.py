@@ -5,8 +5,8 @@ from torch import Tensor
 
 from torchbrdf.models.he_torrance.roughness import lambert_w
 
-_TERMS = 150
-_SWITCH = 80.0
+_TERMS = {torch.float64: 150, torch.float32: 100}
+_SWITCH = {torch.float64: 80.0, torch.float32: 40.0}
 _EXPANSION = (
     (0.8333333333333334, 0.25, 0.0, -0.08333333333333333),
     (
@@ -95,10 +95,10 @@ def series_over_g(g: Tensor, t: Tensor) -> Tensor:
     x = (2 * t / safe) / safe
     w = lambert_w(x.clamp(max=1e30))
     largest = safe * (w / 2).exp()
-    few = largest < _SWITCH
+    few = largest < _SWITCH[g.dtype]
     small = g.masked_fill(~few, 1.0)
     total = torch.zeros_like(g)
-    for m in range(_TERMS, 0, -1):
+    for m in range(_TERMS[g.dtype], 0, -1):
         total = (-t / m).clamp(min=-80.0 if g.dtype == torch.float32 else -700.0).exp() / m + small / (m + 1) * total
     horner = total * (-small).exp()
     many = largest.masked_fill(few, 100.0)
