@@ -90,9 +90,13 @@ def test_lambert_w_and_its_derivatives():
     (second,) = torch.autograd.grad(first.sum(), x)
     assert_close(first, 1 / (w.exp() * (1 + w)), rtol=1e-13, atol=0)
     assert_close(second, -(w + 2) / ((w.exp() ** 2) * (1 + w) ** 3), rtol=1e-12, atol=0)
+    single = x.detach().clamp(max=1e30).float().requires_grad_()
+    w = lambert_w(single)
+    assert_close(w.double(), lambert_w(single.double()), rtol=3e-7, atol=0)
+    assert_close(torch.autograd.grad(w.sum(), single)[0], (1 / (w.exp() * (1 + w))).detach(), rtol=1e-5, atol=0)
     value, tangent = torch.func.jvp(lambert_w, (x.detach(),), (torch.ones_like(x),))
     assert_close(tangent, first, rtol=1e-13, atol=0)
-    assert_close(value, w)
+    assert_close(value, lambert_w(x))
 
 
 @pytest.mark.parametrize("case", GOLDEN["smith"])
