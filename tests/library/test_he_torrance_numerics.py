@@ -192,3 +192,5 @@ def test_shapes():
         assert_close(together[i], alone, rtol=1e-13, atol=0)
     model = HeTorrance(**{n: fixed(v) for n, v in (per_pixel | channels).items()})
     assert model.directional_albedo(doubles([0.5] * 6), nodes=8).shape == (6, 3)
+    with pytest.raises(ValueError, match="parameters are per pixel"):
+        model.energy_bound()

@@ -151,8 +151,10 @@ class HeTorrance(BRDF):
 
         1 less the most that the surface alone reflects; negative where that exceeds 1. Towards 90 degrees a smooth
         dielectric reflects everything, and the bound over the whole hemisphere is 0. Nothing enforces it: parameters
-        in training may pass it. Parameters must not be per pixel.
+        in training may pass it. Raises ValueError for parameters per pixel.
         """
+        if is_per_texel(self):
+            raise ValueError("HeTorrance.energy_bound is that of one material; some of its parameters are per pixel.")
         with torch.no_grad():
             angle = torch.linspace(0, max_angle, _BOUND_ANGLES, dtype=self.sigma0.dtype, device=self.sigma0.device)
             return 1 - self._surface_albedo(angle.cos(), nodes).amax(0)
