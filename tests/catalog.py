@@ -19,6 +19,7 @@ from torchbrdf import (
     Dielectric,
     FujiiOrenNayar,
     Hapke,
+    HeTorrance,
     LambertSphere,
     LommelSeeliger,
     MaxCosinePhong,
@@ -209,6 +210,47 @@ OTHERS = [
         nodes=64,
         albedo_error=5e-3,
         float32=STEEP_LOBE,
+    ),
+    Model(
+        "he_torrance, aluminium",  # Figure 8; the specular part matters at grazing alone
+        lambda dtype: HeTorrance(
+            sigma0=number(0.28, dtype),
+            tau=number(1.77, dtype),
+            wavelength=torch.tensor([0.65, 0.5], dtype=dtype),
+            eta=torch.tensor([1.49, 0.77], dtype=dtype),
+            k=torch.tensor([7.82, 6.08], dtype=dtype),
+            diffuse=number(0.02, dtype),  # covers the far tail of the lobe, which float32 cannot hold
+        ),
+        nodes=96,
+        float32=FACETS,
+    ),
+    Model(
+        "he_torrance, plastic",
+        lambda dtype: HeTorrance(
+            sigma0=number(0.2, dtype),
+            tau=number(2.0, dtype),
+            wavelength=fixed(number(0.55, dtype)),
+            eta=number(1.5, dtype),
+            diffuse=torch.tensor([0.28, 0.15], dtype=dtype),
+        ),
+        nodes=96,
+        float32=FACETS,
+    ),
+    Model(
+        "he_torrance, averaged spike",
+        lambda dtype: HeTorrance(
+            sigma0=number(0.05, dtype),
+            tau=number(0.7, dtype),
+            wavelength=number(0.55, dtype),
+            eta=number(1.5, dtype),
+            solid_angle=1.0,
+            directional_diffuse=False,
+            uniform_diffuse=False,
+        ),
+        nodes=96,
+        integral=1e-3,  # the kinks at apex and rim of the spike are no panel's end
+        albedo_error=2e-2,
+        float32=2e-3,  # at the rim the spike is what two roots leave: relative to its apex all digits are right
     ),
     Model(
         "tabulated",

@@ -90,19 +90,47 @@ def conductor(cos: Tensor, *, eta: Tensor, k: Tensor) -> Tensor:
     Source: Born & Wolf, Principles of Optics, ch. 14.
     """
     sine_squared = ((1 - cos) * (1 + cos)).relu()
+    a_squared, b_squared = _refracted_squares(cos, eta, k)
+    a = safe_sqrt(a_squared)
+    r_s = ((cos - a) ** 2 + b_squared) / ((cos + a) ** 2 + b_squared)
+    absorbed = cos * cos * b_squared
+    p_over_s = ((cos * a - sine_squared) ** 2 + absorbed) / ((cos * a + sine_squared) ** 2 + absorbed)
+    return 0.5 * r_s * (1 + p_over_s)
+
+
+def conductor_amplitudes(cos: Tensor, *, eta: Tensor, k: Tensor) -> tuple[Tensor, Tensor]:
+    r"""Amplitudes of light polarised across (s) and in (p) the plane of incidence, for an index eta + i k.
+
+    .. math::
+        F_s = \frac{c - q}{c + q}, \quad F_p = -F_s \frac{c q - s^2}{c q + s^2}, \quad q = \sqrt{(\eta + i k)^2 - s^2}
+
+    Args: as `conductor`.
+    Returns: F_s and F_p, complex, shapes broadcast. [-] F_p = -F_s at c = 1: p turns with the ray, for a time factor
+        exp(-i w t).
+    Deviations: none. (|F_s|^2 + |F_p|^2)/2 is `conductor`.
+    Source: Born & Wolf, Principles of Optics, section 1.5.2 with ch. 14.
+    """
+    q = refracted_cosine(cos, eta, k)
+    sine_squared = ((1 - cos) * (1 + cos)).relu()
+    s = (cos - q) / (cos + q)
+    return s, -s * (cos * q - sine_squared) / (cos * q + sine_squared)
+
+
+def refracted_cosine(cos: Tensor, eta: Tensor, k: Tensor) -> Tensor:
+    """q = sqrt((eta + i k)^2 - 1 + cos^2), complex, in the first quadrant: index times cosine of the refracted ray."""
+    a_squared, b_squared = _refracted_squares(cos, eta, k)
+    return torch.complex(*torch.broadcast_tensors(safe_sqrt(a_squared), safe_sqrt(b_squared)))
+
+
+def _refracted_squares(cos: Tensor, eta: Tensor, k: Tensor) -> tuple[Tensor, Tensor]:
+    """a^2 and b^2 of a + i b = sqrt((eta + i k)^2 - 1 + cos^2), the smaller without cancellation."""
     real = (eta - 1) * (eta + 1) - k * k + cos * cos
     imaginary = 2 * eta * k
     modulus = safe_sqrt(real * real + imaginary * imaginary)
     larger = 0.5 * (modulus + real.abs())
     smaller = safe_divide(imaginary * imaginary, 4 * larger, where=larger > 0)
     propagating = real >= 0
-    a_squared = torch.where(propagating, larger, smaller)
-    b_squared = torch.where(propagating, smaller, larger)
-    a = safe_sqrt(a_squared)
-    r_s = ((cos - a) ** 2 + b_squared) / ((cos + a) ** 2 + b_squared)
-    absorbed = cos * cos * b_squared
-    p_over_s = ((cos * a - sine_squared) ** 2 + absorbed) / ((cos * a + sine_squared) ** 2 + absorbed)
-    return 0.5 * r_s * (1 + p_over_s)
+    return torch.where(propagating, larger, smaller), torch.where(propagating, smaller, larger)
 
 
 def dielectric_average(*, eta: Tensor) -> Tensor:

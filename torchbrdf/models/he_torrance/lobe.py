@@ -1,0 +1,94 @@
+r"""The two parts of the first-surface reflection without their Fresnel factor: coherent (specular) and diffracted.
+
+All lengths in one unit. h = light + view is not normalised, k = 2 pi/lambda,
+
+.. math::
+    g = [k \sigma (\cos\theta_i + \cos\theta_r)]^2, \quad t = \tfrac14 k^2 \tau^2 |h_{xy}|^2, \quad
+    S(g, t) = \sum_{m \ge 1} \frac{g^m e^{-g}}{m!\, m} e^{-t/m}
+"""
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from torchbrdf._numerics import cross, dot, safe_sqrt
+from torchbrdf.directions import Cosines
+from torchbrdf.microfacet import HalfVector
+from torchbrdf.models.he_torrance.roughness import effective_roughness
+from torchbrdf.models.he_torrance.series import series_over_g
+from torchbrdf.models.he_torrance.shadowing import shadowing
+
+
+class Geometry(NamedTuple):
+    """What the lobe reads of the directions, each (..., 1), broadcast with (channel,). [-]
+
+    Attributes:
+        cos_light, sin_light, cos_view, sin_view: of the polar angles.
+        planar: squared length of the part of h in the mean surface, 0 in the mirror direction.
+        squared: |h|^2 = 4 cos^2 of the local angle of incidence.
+    """
+
+    cos_light: Tensor
+    sin_light: Tensor
+    cos_view: Tensor
+    sin_view: Tensor
+    planar: Tensor
+    squared: Tensor
+
+    @classmethod
+    def of(cls, cosines: Cosines) -> "Geometry":
+        half = HalfVector.of(cosines)
+        squared = 4 * half.cos_light * half.cos_light
+        sines = [_sine(cosines, which) for which in ("light", "view")]
+        parts = (cosines.light, sines[0], cosines.view, sines[1], half.sine_squared * squared, squared)
+        return cls(*(part[..., None] for part in torch.broadcast_tensors(*parts)))
+
+    @property
+    def local_cos(self) -> Tensor:
+        """Cosine of incidence on the facets that mirror light into view."""
+        return self.squared.sqrt() / 2
+
+
+def _sine(cosines: Cosines, which: str) -> Tensor:
+    """Sine of a polar angle (...), from the vectors where they are known; zero gradient at normal incidence."""
+    if cosines.vectors is None:
+        c = getattr(cosines, which)
+        return safe_sqrt((1 - c) * (1 + c))
+    normal, light, view = cosines.vectors
+    across = cross(normal, light if which == "light" else view)
+    return safe_sqrt(dot(across, across).masked_fill(~cosines.above_horizon, 0.0))
+
+
+def diffracted(geometry: Geometry, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
+    r"""Directional-diffuse lobe of a perfect reflector (..., channel). [1/sr]
+
+    .. math::
+        \frac{G S D}{\pi c_i c_r} = \frac{|h|^4}{\pi} \Big(\frac{\pi^2 \sigma \tau}{\lambda^2}\Big)^2
+        \frac{S(g, t)}{g}\, \frac{S_1(\theta_i)}{c_i} \frac{S_1(\theta_r)}{c_r}
+
+    with G = |h|^4/h_z^2 and D of (76), (78). In this order of factors nothing overflows at grazing, in
+    retro-reflection or at normal incidence.
+
+    Args: sigma0, tau (..., 1), wavelength (channel,), one unit of length.
+    """
+    light = shadowing(geometry.cos_light, geometry.sin_light, sigma0=sigma0, tau=tau)
+    view = shadowing(geometry.cos_view, geometry.sin_view, sigma0=sigma0, tau=tau)
+    sigma = sigma0 * effective_roughness(light.k + view.k)
+    phase = 2 * math.pi / wavelength * sigma * (geometry.cos_light + geometry.cos_view)
+    spread = math.pi / wavelength * tau
+    # g and t as (..., channel) alike, so that the series sees one shape
+    g, t = torch.broadcast_tensors(phase * phase, spread * spread * geometry.planar)
+    strength = math.pi**2 / wavelength * sigma * (tau / wavelength) * geometry.squared
+    return strength * strength * series_over_g(g, t) * light.over_cos * view.over_cos / math.pi
+
+
+def coherent(cos: Tensor, sin: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
+    r"""Share :math:`e^{-g} S` of the light that a perfect reflector sends in the mirror direction (..., channel). [-]
+
+    Args: cos, sin of incidence (..., 1); sigma0, tau (..., 1), wavelength (channel,), one unit of length.
+    """
+    seen = shadowing(cos, sin, sigma0=sigma0, tau=tau)
+    phase = 4 * math.pi / wavelength * sigma0 * effective_roughness(2 * seen.k) * cos
+    return (-phase * phase).exp() * seen.visibility * seen.visibility

@@ -1,0 +1,46 @@
+r"""Smith's masking and shadowing of a surface with Gaussian slopes, written so that it stays finite at grazing.
+
+.. math::
+    S_1 = \frac{1 - \tfrac12\mathrm{erfc}(b)}{1 + \Lambda(b)} = \frac{N}{N + e^{-b^2}}, \quad
+    N = \sqrt\pi\, b\,(1 + \mathrm{erf}\, b), \quad b = \frac{\tau \cot\theta}{2 \sigma_0}
+
+Source: Smith 1967; He et al. 1991, eqs. (23)-(25). The factor exp(-b^2) of Lambda follows from Smith's integral.
+"""
+
+import math
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from torchbrdf._numerics import safe_divide
+
+# exp(-b^2) and erfc(b) are below 4e-44 beyond: nothing is hidden. Holds normal incidence and sigma0 = 0.
+_OPEN = 10.0
+
+
+class Shadowing(NamedTuple):
+    """What one direction sees of the surface, each (...).
+
+    Attributes:
+        over_cos: S_1/cos(theta): 1/cos for steep directions, sqrt(pi) tau/(2 sigma0 sin) at grazing. [-]
+        visibility: S_1 itself. [-] in (0, 1]
+        k: tan(theta) erfc(b), the share of heights that is hidden in (82). [-]
+    """
+
+    over_cos: Tensor
+    visibility: Tensor
+    k: Tensor
+
+
+def shadowing(cos: Tensor, sin: Tensor, *, sigma0: Tensor, tau: Tensor) -> Shadowing:
+    """Shadowing of a direction with cosine > 0 and sine >= 0 to the normal, each (...); sigma0 >= 0, tau > 0 (...)."""
+    run, rise = tau * cos, 2 * sigma0 * sin
+    cut = run < _OPEN * rise
+    slope = safe_divide(tau.expand_as(cut), rise, where=cut)  # b = slope cos; 0 where nothing is hidden
+    b = slope * cos
+    sides = math.sqrt(math.pi) * (1 + torch.erf(b))
+    over_cos = torch.where(cut, slope * sides / (b * sides + (-b * b).exp()), 1 / cos)
+    k = (sin / cos * torch.erfc(b)).masked_fill(~cut, 0.0)
+    visibility = torch.where(cut, over_cos * cos, torch.ones_like(over_cos))
+    return Shadowing(over_cos, visibility, k)
