@@ -15,8 +15,24 @@ import matplotlib.pyplot as plt
 import torch
 
 from inverse import (
-    Disc, Distant, Group, Plan, Plane, Point, Scene, Sphere, cylinder, everything, orthographic, photographed, pinhole,
-    plan, plane, render, sphere, vase,
+    Disc,
+    Distant,
+    Group,
+    Plan,
+    Plane,
+    Point,
+    Scene,
+    Sphere,
+    cylinder,
+    everything,
+    orthographic,
+    photographed,
+    pinhole,
+    plan,
+    plane,
+    render,
+    sphere,
+    vase,
 )  # fmt: skip
 from torchbrdf import BRDF, GGX, RoughSurface
 
@@ -35,7 +51,10 @@ def three_scenes(size: int) -> dict[str, tuple[Scene, BRDF]]:
     table = Group((Sphere(0.5, (0.0, -0.1, 0.0)), Plane((0.0, 0.9, 0.44), (0.0, -0.6, 0.0))))
     from_afar = photographed(vase(8, 8).solid, pinhole(size, size, field_of_view=8.0), samples=2)
     return {
-        "vase of clay, light from 20 degrees": (Scene(vase(size, size, samples=2), [Distant.from_angle(20)]), clay(0.7, 35)),
+        "vase of clay, light from 20 degrees": (
+            Scene(vase(size, size, samples=2), [Distant.from_angle(20)]),
+            clay(0.7, 35),
+        ),
         "dark smooth vase from afar, a raised lamp": (Scene(from_afar, [Point(30 * up, 1000.0)]), clay(0.15, 5)),
         "glossy ball on a table, the sun": (
             Scene(orthographic(table, size, size, samples=2), [Disc(up, 0.01)]),
@@ -60,7 +79,9 @@ def compared(scene: Scene, model: BRDF, planned: Plan) -> tuple[torch.Tensor, to
 
 def grid(count: int, size: int) -> None:
     """Worst error over tolerance, and the speed-ups, over scenes drawn from all combinations."""
-    kinds = list(itertools.product(SHAPES, (0, 20, 60), (0, 10, 30, 50), (0.2, 0.6, 0.95), (False, True), (False, True)))
+    kinds = list(
+        itertools.product(SHAPES, (0, 20, 60), (0, 10, 30, 50), (0.2, 0.6, 0.95), (False, True), (False, True))
+    )
     drawn = random.Random(0).sample(kinds, count)
     for tolerance in (1e-1, 1e-2, 1e-3):
         worst, ratios = 0.0, []
