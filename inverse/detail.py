@@ -10,9 +10,9 @@ from torch import Tensor
 
 from inverse.footprints import footprints
 from inverse.geometry import pixel_average
-from inverse.lights import Distant, Point
 from inverse.scene import Scene
 from inverse.shading import arrivals
+from inverse.simplify import beams
 
 # Shares of the pixels, smoothest first, that are tried with one sample.
 _SHARES = (1.0, 0.98, 0.95, 0.9, 0.8, 0.6, 0.4)
@@ -30,13 +30,13 @@ def details(scene: Scene) -> Iterator[tuple[str, Callable[[Scene], Scene]]]:
     full = surface.coverage() == 1
     where = footprints(surface, torch.zeros_like(full))
     edge = torch.zeros_like(full)
-    for light in (k for entry in scene.lights for k in entry if isinstance(k, Distant | Point)):
+    for light in beams(scene):
         arrival = next(arrivals(light, where if scene.shadows else replace(where, solid=None)))
         cosine = (where.normals * arrival.direction).sum(-1)
         width = torch.sin(torch.acos(length.clamp(max=1)).clamp(max=math.pi / 2)).flatten()[where.pixel] * 2
         on_edge = where.to_image((cosine.abs() < width).to(mean)[:, None])[..., 0] > 0
         dark = where.to_image((arrival.irradiance.amax(-1) <= 0).expand(cosine.shape).to(mean)[:, None])
-        edge = edge | on_edge | _borders(dark[..., 0] > 0)
+        edge = edge | on_edge | borders(dark[..., 0] > 0)
     for share in _SHARES:
         limit = torch.quantile(1 - length[full & ~edge].double(), share) if (full & ~edge).any() else 0.0
         detail = full & (edge | (1 - length.double() > limit))
@@ -45,7 +45,7 @@ def details(scene: Scene) -> Iterator[tuple[str, Callable[[Scene], Scene]]]:
         yield choice, partial(replace, detail=detail)
 
 
-def _borders(mask: Tensor) -> Tensor:
+def borders(mask: Tensor) -> Tensor:
     """Pixels within one of where a mask (rows, columns) changes."""
     fields = torch.stack((mask, ~mask)).to(torch.float32)[:, None]
     near = torch.nn.functional.max_pool2d(fields, 3, stride=1, padding=1)[:, 0] > 0

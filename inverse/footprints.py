@@ -53,9 +53,8 @@ def footprints(surface: Surface, detail: Tensor | None = None) -> Footprints:
 
     Args:
         detail: pixels (rows, columns) that need all their points. Of the others those that the object fills
-            get one point instead, with the mean directions and the mean position, raised to the highest of the
-            points so that it does not lie inside a bulge: exact to first order in the variation inside the pixel.
-            None: all points everywhere.
+            get one point instead, with the mean directions and the mean position, raised where that lies inside a
+            bulge: exact to first order in the variation inside the pixel. None: all points everywhere.
     """
     rows, columns = surface.resolution
     s, mask = surface.samples, surface.mask
@@ -70,11 +69,12 @@ def footprints(surface: Surface, detail: Tensor | None = None) -> Footprints:
     kept = mask & ~merged.repeat_interleave(s, 0).repeat_interleave(s, 1)
     upright = _unit(pixel_average(surface.normals, s)[merged])
     middle = pixel_average(surface.points, s)[merged]
-    block = surface.points.unflatten(0, (rows, s)).unflatten(2, (columns, s)).transpose(1, 2)[merged].flatten(1, 2)
-    rise = ((block - middle[:, None]) * upright[:, None]).sum(-1).amax(-1, keepdim=True)
+    # the tangent planes of a bulge's points pass above it, and their mean below
+    rise = ((_blocks(surface.points, s)[merged] - middle[:, None]) * _blocks(surface.normals, s)[merged]).sum(-1)
+    middle = middle + rise.amax(-1, keepdim=True).clamp(min=0) * upright
     weight = surface.normals.new_full((int(kept.sum()),), 1 / s**2)
     return Footprints(
-        torch.cat((surface.points[kept], middle + rise * upright)),
+        torch.cat((surface.points[kept], middle)),
         torch.cat((surface.normals[kept], upright)),
         surface.view
         if surface.view.ndim == 1
@@ -84,6 +84,11 @@ def footprints(surface: Surface, detail: Tensor | None = None) -> Footprints:
         (rows, columns),
         surface.solid,
     )
+
+
+def _blocks(field: Tensor, samples: int) -> Tensor:
+    """Values (rows, columns, 3) by pixel: (rows, columns, point, 3)."""
+    return field.unflatten(1, (-1, samples)).unflatten(0, (-1, samples)).transpose(1, 2).flatten(2, 3)
 
 
 def _unit(vectors: Tensor) -> Tensor:

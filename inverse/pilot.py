@@ -5,9 +5,10 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from inverse.detail import borders
 from inverse.geometry import pixel_average
-from inverse.lights import Distant, Point
 from inverse.scene import Scene
+from inverse.simplify import beams
 from inverse.visibility import distance_to, shadowless, unshadowed
 
 # Bins of a polar angle, from along the axis to perpendicular, and beyond.
@@ -19,8 +20,8 @@ _LIGHTS = 3
 def pilot(scene: Scene, count: int, seed: int) -> tuple[Scene, Tensor]:
     """A scene that shows about `count` of the object's pixels, and which they are (rows, columns).
 
-    The pixels are drawn evenly from strata of incidence for each light, of obliqueness to the view, of cast
-    shadow, of the side of the object, and of full or partial coverage: what effects depend on.
+    The pixels are drawn evenly from strata of incidence for each light, of obliqueness to the view, of cast shadow and
+    its edge, of the side of the object, and of full or partial coverage: what effects depend on.
     """
     surface = scene.surface
     strata, shown = _strata(scene)
@@ -53,13 +54,13 @@ def _strata(scene: Scene) -> tuple[Tensor, Tensor]:
     view = surface.view if surface.view.ndim == 1 else mean(surface.view)
     number = _bin((normals * view).sum(-1), _VIEW_BINS) * 2 + (coverage[shown] == 1)
     number = number * 4 + 2 * (normals[:, 0] > 0) + (normals[:, 1] > 0)
-    lights = [k for entry in scene.lights for k in entry if isinstance(k, Distant | Point)]
-    for light in lights[:_LIGHTS]:
+    for light in beams(scene)[:_LIGHTS]:
         direction = next(light.arrivals(points)).direction
         number = number * (_LIGHT_BINS + 1) + _bin((normals * direction).sum(-1), _LIGHT_BINS)
         if surface.solid is not None and shadowless(surface.solid, light) is None:
             lit = unshadowed(surface.solid, points, normals, direction, distance_to(light, points))
-            number = number * 2 + lit
+            edge = borders(torch.zeros_like(shown).masked_scatter(shown, lit))[shown]
+            number = number * 4 + 2 * lit + edge
     return torch.zeros_like(shown, dtype=torch.long).masked_scatter(shown, number.long()), shown
 
 

@@ -75,7 +75,7 @@ def simpler(scene: Scene) -> Iterator[Simpler]:
         SOFTNESS,
         None if _any(lights, Disc) else "no source has an extent",
         "all its light from its centre",
-        lambda s: relit(s, lambda k: Distant(k.direction, k.irradiance) if isinstance(k, Disc) else k),
+        lambda s: relit(s, _centred),
     )
     coarse = all(k.radiance.shape[0] % 2 or k.radiance.shape[1] % 2 for k in lights if isinstance(k, Environment))
     yield Simpler(
@@ -102,6 +102,16 @@ def simpler(scene: Scene) -> Iterator[Simpler]:
 def relit(scene: Scene, change: Callable[[Light], Light]) -> Scene:
     """The scene with each light replaced."""
     return replace(scene, lights=[[change(light) for light in entry] for entry in scene.lights])
+
+
+def beams(scene: Scene) -> list[Distant | Point]:
+    """The lights whose shadows have an edge, all images together; a disc by its centre."""
+    centred = [_centred(light) for entry in scene.lights for light in entry]
+    return [light for light in centred if isinstance(light, Distant | Point)]
+
+
+def _centred(light: Light) -> Light:
+    return Distant(light.direction, light.irradiance) if isinstance(light, Disc) else light
 
 
 def _any(lights: list[Light], kind: type) -> bool:
