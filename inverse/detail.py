@@ -1,6 +1,5 @@
 """Which pixels need all their samples: where the radiance may vary inside a pixel."""
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -8,41 +7,66 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from inverse.footprints import footprints
-from inverse.geometry import pixel_average
+from inverse.footprints import Footprints, footprints
+from inverse.geometry import Surface, pixel_average
 from inverse.scene import Scene
-from inverse.shading import arrivals
+from inverse.shading import arrivals, render
 from inverse.simplify import beams
+from torchbrdf import BRDF
 
 # Shares of the pixels, smoothest first, that are tried with one sample.
 _SHARES = (1.0, 0.98, 0.95, 0.9, 0.8, 0.6, 0.4)
 
 
-def details(scene: Scene) -> Iterator[tuple[str, Callable[[Scene], Scene]]]:
+def details(scene: Scene, model: BRDF) -> Iterator[tuple[str, Callable[[Scene], Scene]]]:
     """Ways to leave samples out, from the cheapest on: what is done instead, and the change of the scene.
 
-    Ever more pixels keep all their samples: first those where the normals spread most, and always those that the
-    edge of an attached or cast shadow may cross.
+    Ever more pixels keep all their samples: first those where the normals spread most or where the image of one sample
+    a pixel bends most from pixel to pixel, and always those that the edge of a shadow may cross.
     """
-    surface, s = scene.surface, scene.surface.samples
-    mean = pixel_average(surface.normals, s)
-    length = mean.norm(dim=-1)
+    surface = scene.surface
     full = surface.coverage() == 1
-    where = footprints(surface, torch.zeros_like(full))
-    edge = torch.zeros_like(full)
-    for light in beams(scene):
-        arrival = next(arrivals(light, where if scene.shadows else replace(where, solid=None)))
-        cosine = (where.normals * arrival.direction).sum(-1)
-        width = torch.sin(torch.acos(length.clamp(max=1)).clamp(max=math.pi / 2)).flatten()[where.pixel] * 2
-        on_edge = where.to_image((cosine.abs() < width).to(mean)[:, None])[..., 0] > 0
-        dark = where.to_image((arrival.irradiance.amax(-1) <= 0).expand(cosine.shape).to(mean)[:, None])
-        edge = edge | on_edge | borders(dark[..., 0] > 0)
-    for share in _SHARES:
-        limit = torch.quantile(1 - length[full & ~edge].double(), share) if (full & ~edge).any() else 0.0
-        detail = full & (edge | (1 - length.double() > limit))
+    none = torch.zeros_like(full)
+    with torch.no_grad():
+        bend = _bend(render(replace(scene, detail=none), model))
+    edge = _shadow_edges(scene, footprints(surface, none))
+    rest = full & ~edge
+    signs = [bend.double(), _spread(surface).double()]
+    for share in _SHARES if rest.any() else ():
+        above = [sign > torch.quantile(sign[rest], share) for sign in signs]
+        detail = full & (edge | above[0] | above[1])
         merged = float((full & ~detail).sum() / full.sum())
         choice = f"one sample in {merged:.0%} of the pixels, where the radiance hardly varies"
         yield choice, partial(replace, detail=detail)
+
+
+def _bend(images: Tensor) -> Tensor:
+    """Largest second difference (rows, columns) of any image (image, rows, columns, channel) in both directions."""
+    wide = torch.nn.functional.pad(images.movedim(-1, 1), (1, 1, 1, 1), mode="replicate")
+    middle = 2 * wide[..., 1:-1, 1:-1]
+    across = wide[..., 1:-1, 2:] + wide[..., 1:-1, :-2] - middle
+    along = wide[..., 2:, 1:-1] + wide[..., :-2, 1:-1] - middle
+    return (across.abs() + along.abs()).amax((0, 1))
+
+
+def _spread(surface: Surface) -> Tensor:
+    """How much the normals inside each pixel differ: 1 less the length of their mean (rows, columns)."""
+    return 1 - pixel_average(surface.normals, surface.samples).norm(dim=-1)
+
+
+def _shadow_edges(scene: Scene, where: Footprints) -> Tensor:
+    """Pixels (rows, columns) that the edge of an attached or a cast shadow may cross."""
+    spread = _spread(scene.surface)
+    edge = torch.zeros_like(spread, dtype=torch.bool)
+    for light in beams(scene):
+        arrival = next(arrivals(light, where if scene.shadows else replace(where, solid=None)))
+        cosine = (where.normals * arrival.direction).sum(-1)
+        # normals that spread by an angle a leave a mean of length about 1 - a^2/4 at most
+        width = 2 * (2 * spread).sqrt().flatten()[where.pixel]
+        near = where.to_image((cosine.abs() < width).to(spread)[:, None])[..., 0] > 0
+        dark = where.to_image((arrival.irradiance.amax(-1) <= 0).expand(cosine.shape).to(spread)[:, None])[..., 0] > 0
+        edge = edge | near | borders(dark)
+    return edge
 
 
 def borders(mask: Tensor) -> Tensor:

@@ -21,7 +21,8 @@ def pilot(scene: Scene, count: int, seed: int) -> tuple[Scene, Tensor]:
     """A scene that shows about `count` of the object's pixels, and which they are (rows, columns).
 
     The pixels are drawn evenly from strata of incidence for each light, of obliqueness to the view, of cast shadow and
-    its edge, of the side of the object, and of full or partial coverage: what effects depend on.
+    its edge, of the side of the object, and of full or partial coverage: what effects depend on. The most curved
+    pixel of each stratum comes first.
     """
     surface = scene.surface
     strata, shown = _strata(scene)
@@ -32,6 +33,11 @@ def pilot(scene: Scene, count: int, seed: int) -> tuple[Scene, Tensor]:
     by_stratum = stratum.argsort(stable=True)
     rank = torch.empty_like(by_stratum)
     rank[by_stratum] = torch.cat([torch.arange(int(k)) for k in sizes])
+    flatness = pixel_average(surface.normals, surface.samples).norm(dim=-1)[shown][order]
+    by_curvature = flatness.argsort()
+    places = torch.arange(len(order))
+    first = torch.zeros_like(sizes).scatter_reduce(0, stratum[by_curvature], places, "amin", include_self=False)
+    rank[by_curvature[first]] = -1
     chosen = torch.zeros(int(shown.sum()), dtype=torch.bool)
     chosen[order[rank.argsort(stable=True)[:count]]] = True
     pixels = torch.zeros_like(shown).masked_scatter(shown, chosen)

@@ -70,7 +70,7 @@ def plan(
     stand_in, done = _cheapest_material(model, lambda k: error(sample, k) <= budget)
     left = full
     for entry in sorted(present, key=lambda k: -alone[k.effect].saved):
-        ways = details(left) if entry.effect == FOOTPRINT else [(entry.choice, entry.apply)]
+        ways = details(left, stand_in) if entry.effect == FOOTPRINT else [(entry.choice, entry.apply)]
         for choice, apply in ways:
             if error(apply(sample), stand_in) <= budget:
                 sample, left = apply(sample), apply(left)
