@@ -29,12 +29,17 @@ class RadianceDifference:
 class SigmaBias:
     """Bias of sigma [rad] when the reference is fitted by the simpler simulation: to first order, least squares.
 
-    The limit is a share of the standard error of sigma that the sensor's noise leaves when all pixels are fitted.
+    The limit is a share of the standard error of sigma that the sensor's noise leaves when all pixels are fitted, those
+    the object fills. A pixel of the pilot counts as often as the pixels it stands for.
     """
 
-    def __init__(self, reference: Tensor, tolerance: float, *, scene: Scene, model: BRDF, pixels: Tensor, total: int):
+    def __init__(
+        self, reference: Tensor, tolerance: float, *, scene: Scene, model: BRDF, pixels: Tensor, stands_for: Tensor
+    ):
         self.reference = reference
         self.pixels = pixels
+        filled = scene.surface.coverage()[pixels] == 1
+        self.root = (stands_for * filled).sqrt()[None, :, None].expand(reference.shape).reshape(-1, 1)
         sensor = scene.sensor
         well = 0.0 if sensor.full_well is None else float(reference.mean()) / (sensor.exposure * sensor.full_well)
         noise = math.sqrt((sensor.read_noise / sensor.exposure) ** 2 + well)
@@ -46,7 +51,7 @@ class SigmaBias:
         if not names:
             raise ValueError(f"plan(of='sigma') needs a model with a trained sigma; found {type(model).__name__}.")
         self.sigma = float(max(_physical(model, name) for name in names))
-        covariance = torch.linalg.pinv(derivative.T @ derivative) * (noise**2 * pixels.sum() / total)
+        covariance = torch.linalg.pinv(derivative.T @ derivative) * noise**2
         errors = [math.sqrt(float(covariance[place, place])) * abs(slope) for place, slope in scale]
         self.limit = tolerance * min(errors)
 
@@ -55,11 +60,11 @@ class SigmaBias:
         derivative, names, scale = self._derivative(scene, model)
         if not names:
             return self.sigma
-        change = torch.linalg.lstsq(derivative, (self.reference - values).flatten()[:, None]).solution[:, 0]
+        change = torch.linalg.lstsq(derivative, (self.reference - values).reshape(-1, 1) * self.root).solution[:, 0]
         return max(abs(float(change[place]) * slope) for place, slope in scale)
 
     def _derivative(self, scene: Scene, model: BRDF) -> tuple[Tensor, list[str], list[tuple[int, float]]]:
-        """d values/d raw parameters (sample, parameter); the sigmas; their places, and d sigma/d raw."""
+        """Weighted d values/d raw parameters (sample, parameter); the sigmas; their places, and d sigma/d raw."""
         entries = trainable(model)
         own = dict(model.named_parameters())
         raws = {raw: own[raw].detach() for raw, _ in entries.values()}
@@ -74,7 +79,8 @@ class SigmaBias:
                 scale += [(place + k, float(v)) for k, v in enumerate(slope)]
                 names.append(name)
             place += columns[-1].shape[1]
-        return (torch.cat(columns, 1) if columns else self.reference.new_zeros(self.reference.numel(), 0)), names, scale
+        found = torch.cat(columns, 1) if columns else self.reference.new_zeros(self.reference.numel(), 0)
+        return found * self.root, names, scale
 
 
 def _physical(model: BRDF, name: str) -> Tensor:

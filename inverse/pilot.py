@@ -17,12 +17,12 @@ _VIEW_BINS, _LIGHT_BINS = 6, 9
 _LIGHTS = 3
 
 
-def pilot(scene: Scene, count: int, seed: int) -> tuple[Scene, Tensor]:
-    """A scene that shows about `count` of the object's pixels, and which they are (rows, columns).
+def pilot(scene: Scene, count: int, seed: int, *, extremes: bool) -> tuple[Scene, Tensor, Tensor]:
+    """A scene that shows `count` of the object's pixels, which they are (rows, columns), and for how many each stands.
 
     The pixels are drawn evenly from strata of incidence for each light, of obliqueness to the view, of cast shadow and
-    its edge, of the side of the object, and of full or partial coverage: what effects depend on. The most curved
-    pixel of each stratum comes first.
+    its edge, of the side of the object, and of full or partial coverage: what effects depend on. With
+    `extremes` the most curved pixel of each stratum comes first: the sample is then no longer fair.
     """
     surface = scene.surface
     strata, shown = _strata(scene)
@@ -33,16 +33,19 @@ def pilot(scene: Scene, count: int, seed: int) -> tuple[Scene, Tensor]:
     by_stratum = stratum.argsort(stable=True)
     rank = torch.empty_like(by_stratum)
     rank[by_stratum] = torch.cat([torch.arange(int(k)) for k in sizes])
-    flatness = pixel_average(surface.normals, surface.samples).norm(dim=-1)[shown][order]
-    by_curvature = flatness.argsort()
-    places = torch.arange(len(order))
-    first = torch.zeros_like(sizes).scatter_reduce(0, stratum[by_curvature], places, "amin", include_self=False)
-    rank[by_curvature[first]] = -1
-    chosen = torch.zeros(int(shown.sum()), dtype=torch.bool)
-    chosen[order[rank.argsort(stable=True)[:count]]] = True
-    pixels = torch.zeros_like(shown).masked_scatter(shown, chosen)
+    if extremes:
+        flatness = pixel_average(surface.normals, surface.samples).norm(dim=-1)[shown][order]
+        by_curvature = flatness.argsort()
+        places = torch.arange(len(order))
+        first = torch.zeros_like(sizes).scatter_reduce(0, stratum[by_curvature], places, "amin", include_self=False)
+        rank[by_curvature[first]] = -1
+    taken = rank.argsort(stable=True)[:count]
+    stands_for = torch.zeros(len(order), dtype=surface.normals.dtype)
+    share = sizes / stratum[taken].bincount(minlength=len(sizes)).clamp(min=1)
+    stands_for[order[taken]] = share[stratum[taken]].to(stands_for)
+    pixels = torch.zeros_like(shown).masked_scatter(shown, stands_for > 0)
     fine = pixels.repeat_interleave(surface.samples, 0).repeat_interleave(surface.samples, 1)
-    return replace(scene, surface=replace(surface, mask=surface.mask & fine)), pixels
+    return replace(scene, surface=replace(surface, mask=surface.mask & fine)), pixels, stands_for[stands_for > 0]
 
 
 def _strata(scene: Scene) -> tuple[Tensor, Tensor]:

@@ -46,14 +46,13 @@ def plan(
     """
     _check(tolerance, of, safety, pixels, model)
     full = everything(scene)
-    sample, chosen = pilot(full, pixels, seed)
+    sample, chosen, stands_for = pilot(full, pixels, seed, extremes=of == "radiance")
     watch = _Watch(sample, model, chosen)
     reference = watch.values(sample, model)
     if of == "radiance":
         measure = RadianceDifference(reference, tolerance)
     else:
-        total = int((full.surface.coverage() > 0).sum())
-        measure = SigmaBias(reference, tolerance, scene=sample, model=model, pixels=chosen, total=total)
+        measure = SigmaBias(reference, tolerance, scene=sample, model=model, pixels=chosen, stands_for=stands_for)
     budget = measure.limit / safety
 
     entries = list(simpler(full))
