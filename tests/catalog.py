@@ -42,7 +42,16 @@ def gold(dtype: torch.dtype) -> Conductor:
 def every_other(dtype: torch.dtype) -> BRDF:
     """The other models in one sum, for one compiled graph."""
     x = {m.name: m for m in OTHERS}
-    names = ["torrance_sparrow, glass", "ggx, brushed", "beckmann", "eon", "hapke", "minnaert", "coupled, glass"]
+    names = [
+        "torrance_sparrow, glass",
+        "ggx, brushed",
+        "beckmann",
+        "eon",
+        "hapke",
+        "minnaert",
+        "coupled, glass",
+        "he_torrance, plastic",
+    ]
     parts = [x[name].make(dtype) for name in names]
     inner = [part.brdf if isinstance(part, Oriented) else part for part in parts]
     total = 0.2 * inner[0]
@@ -231,7 +240,7 @@ OTHERS = [
             tau=number(2.0, dtype),
             wavelength=fixed(number(0.55, dtype)),
             eta=number(1.5, dtype),
-            diffuse=torch.tensor([0.28, 0.15], dtype=dtype),
+            diffuse=torch.tensor([0.28, 0.2, 0.15], dtype=dtype),
         ),
         nodes=96,
         float32=FACETS,
