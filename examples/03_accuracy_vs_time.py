@@ -39,6 +39,8 @@ def every_model() -> dict[str, BRDF]:
             found[name] = kind.of(torchbrdf.EON(), dtype=torch.float32)
         elif kind is torchbrdf.TabulatedRoughSurface:
             found[name] = kind(weights=torch.full((16,), 1 / 16))
+        elif kind is torchbrdf.HeTorrance:  # Figure 8 of the paper, lengths in um
+            found[name] = kind(sigma0=0.28, tau=1.77, wavelength=0.5, eta=0.77, k=6.08)
         elif kind not in (torchbrdf.Oriented, torchbrdf.WeightedSum):
             found[name] = kind()
     return found

@@ -103,6 +103,22 @@ def test_gallery_leaves_no_model_out():
     assert models - shown <= {"BRDF", "ImageBRDF", "LinearBRDF"}
 
 
+def test_he_torrance_figures_say_which_claims_hold(run, tmp_path):
+    printed = run("06_he_torrance_figures.py", "--points", 41, "--output", tmp_path).splitlines()
+    verdict = {line.rsplit(": ", 1)[0]: line.rsplit(": ", 1)[1] for line in printed if line.startswith("Figure")}
+    assert {v for claim, v in verdict.items() if claim.startswith("Figure 9")} == {"does NOT hold"}
+    assert {v for claim, v in verdict.items() if not claim.startswith("Figure 9")} == {"holds"}
+    assert len(verdict) == 6
+    assert "exceeds the energy bound" in printed[0]
+    assert (tmp_path / "he_torrance_lobes.png").exists()
+
+
+def test_cylinders_of_growing_roughness(run, tmp_path):
+    assert len(run("06_he_torrance_cylinders.py", "--size", 10, "--output", tmp_path).splitlines()) == 9
+    with Image.open(tmp_path / "he_torrance_cylinders.png") as picture:
+        assert picture.size[0] > 600
+
+
 def test_paints_are_fitted_and_called_glossy(run, tmp_path):
     names = ("Lambert", "Lambert + GGX")
     if not CORNELL.is_dir():
