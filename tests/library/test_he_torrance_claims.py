@@ -57,7 +57,9 @@ def test_aluminium_at_long_wavelengths_is_specular(theta, rho, ratio):
     assert spike_over_the_rest(aluminium(2.0), theta) == pytest.approx(ratio, rel=0.03)
 
 
-@pytest.mark.parametrize(("theta", "peak", "rise"), [(10, 13.2, 1.005), (30, 41.9, 1.06), (45, 67.4, 1.25), (60, 80.9, 1.57)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("theta", "peak", "rise"), [(10, 13.2, 1.005), (30, 41.9, 1.06), (45, 67.4, 1.25), (60, 80.9, 1.57)]
+)
 def test_maximum_beyond_the_specular_angle(theta, peak, rise):
     curve = total(aluminium(0.5), theta, VIEWS)
     assert VIEWS[curve.argmax()].item() == pytest.approx(peak, abs=0.1)
