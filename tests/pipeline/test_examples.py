@@ -82,6 +82,13 @@ def test_every_model_is_timed(run):
     assert float(printed["RoughSurface"]) > float(printed["OrenNayar"])
 
 
+def test_schemes_of_the_series_are_measured_and_drawn(run, tmp_path):
+    printed = run("03_accuracy_vs_time.py", "--series", "--points", 2000, "--output", tmp_path)
+    shipped = next(line for line in printed.splitlines() if line.startswith("| as shipped"))
+    assert "| 0.00% |" in shipped
+    assert (tmp_path / "series.png").exists()
+
+
 def test_figures_of_the_paper(run, tmp_path):
     printed = run("04_paper_figures.py", "--size", 16, "--points", 9, "--output", tmp_path).split()
     assert len(printed) == 12
