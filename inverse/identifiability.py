@@ -94,7 +94,8 @@ def _tied(unknowns: Unknowns, covariance: Covariance, noise: float) -> str:
     labels = unknowns.shared_labels()
     domains = [entry.domain for entry in unknowns.shared_entries for _ in range(entry.start.numel())]
     positive = [k for k, d in enumerate(domains) if isinstance(d, Interval) and math.isinf(d.high)]
-    for direction in covariance.blind:
+    if len(covariance.blind) == 1:  # of several, any mixture is one
+        direction = covariance.blind[0]
         involved = (direction.abs() > _INVOLVED).nonzero()[:, 0].tolist()
         if len(involved) == 2 and set(involved) <= set(positive):
             i, j = involved

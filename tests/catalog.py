@@ -225,7 +225,7 @@ OTHERS = [
         lambda dtype: HeTorrance(
             sigma0=number(0.28, dtype),
             tau=number(1.77, dtype),
-            wavelength=torch.tensor([0.65, 0.5], dtype=dtype),
+            wavelength=fixed(torch.tensor([0.65, 0.5], dtype=dtype)),
             eta=torch.tensor([1.49, 0.77], dtype=dtype),
             k=torch.tensor([7.82, 6.08], dtype=dtype),
             diffuse=number(0.02, dtype),  # covers the far tail of the lobe, which float32 cannot hold
@@ -250,7 +250,7 @@ OTHERS = [
         lambda dtype: HeTorrance(
             sigma0=number(0.05, dtype),
             tau=number(0.7, dtype),
-            wavelength=number(0.55, dtype),
+            wavelength=fixed(number(0.55, dtype)),
             eta=number(1.5, dtype),
             solid_angle=1.0,
             directional_diffuse=False,
