@@ -20,6 +20,8 @@ _TIED = 0.999
 _LOOSE = 0.15
 # Weight in a singular direction from which a parameter is named as part of it.
 _INVOLVED = 0.3
+# And up to which it has no part in it.
+_ABSENT = 0.01
 
 
 class Covariance:
@@ -96,7 +98,7 @@ def _tied(unknowns: Unknowns, covariance: Covariance, noise: float) -> str:
     positive = [k for k, d in enumerate(domains) if isinstance(d, Interval) and math.isinf(d.high)]
     if len(covariance.blind) == 1:  # of several, any mixture is one
         direction = covariance.blind[0]
-        involved = (direction.abs() > _INVOLVED).nonzero()[:, 0].tolist()
+        involved = (direction.abs() > _ABSENT).nonzero()[:, 0].tolist()
         if len(involved) == 2 and set(involved) <= set(positive):
             i, j = involved
             return _either(labels[i], labels[j], ratio=bool(direction[i] * direction[j] > 0))

@@ -3,11 +3,14 @@
 The noise is a share of each value, so the knee lies below the values that count: far above it logarithms are compared.
 """
 
+import math
+from typing import final
+
 import pytest
 import torch
 
 from inverse import FitResult, Measurements, fit_measurements
-from torchbrdf import ALUMINIUM, HeTorrance, fixed
+from torchbrdf import ALUMINIUM, BRDF, Constrained, Cosines, HeTorrance, Interval, fixed
 
 F64 = torch.float64
 NOISE = 0.01
@@ -76,3 +79,32 @@ def test_spike_alone_pulls_no_start_that_is_too_rough():
     assert found.status == "not identified"
     near = fit_measurements(measured, aluminium(0.1, 2.0, (0.5, 2.0), **parts))
     assert near.parameters["sigma0"].item() == pytest.approx(0.05, rel=0.05)
+
+
+def test_lengths_have_no_scale_of_their_own():
+    free = aluminium(0.28, 1.77, (0.5, 2.0))
+    free.wavelength = torch.tensor([0.5, 2.0], dtype=F64)
+    found = fit_measurements(scans(aluminium(0.28, 1.77, (0.5, 2.0))), free, knee=KNEE)
+    assert found.status == "not identified"
+    assert found.reason == "the data cannot tell sigma0 from tau"  # nor from the wavelengths, which weigh less
+
+
+@final
+class Factors(BRDF):
+    """Known by the product of two positive numbers alone."""
+
+    a: Constrained = Constrained(Interval(0.0, math.inf))
+    b: Constrained = Constrained(Interval(0.0, math.inf))
+
+    def __init__(self):
+        super().__init__()
+        self.a, self.b = torch.tensor(0.5, dtype=F64), torch.tensor(2.0, dtype=F64)
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, torch.Tensor]:
+        return {"all": (self.a * self.b * cosines.light / math.pi)[..., None]}
+
+
+def test_a_product_is_called_one():
+    found = fit_measurements(scans(aluminium(0.28, 1.77, (0.5,))), Factors())
+    assert found.status == "not identified"
+    assert found.reason == "the data tell the product of a and b, and hardly either"
