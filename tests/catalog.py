@@ -226,7 +226,7 @@ OTHERS = [
             sigma0=number(0.28, dtype),
             tau=number(1.77, dtype),
             wavelength=fixed(torch.tensor([0.65, 0.5], dtype=dtype)),
-            eta=torch.tensor([1.49, 0.77], dtype=dtype),
+            eta=fixed(torch.tensor([1.49, 0.77], dtype=dtype)),  # (1 + k^2)/eta reflects as much at normal incidence
             k=torch.tensor([7.82, 6.08], dtype=dtype),
             diffuse=number(0.02, dtype),  # covers the far tail of the lobe, which float32 cannot hold
         ),
