@@ -17,6 +17,7 @@ lint: .venv/ready
 
 bench: .venv/ready
 	$(BIN)/python examples/03_accuracy_vs_time.py --output output
+	$(BIN)/python examples/03_accuracy_vs_time.py --output output --series --points 131072
 
 clean:
 	rm -rf .venv build output *.egg-info .pytest_cache .ruff_cache

@@ -2,7 +2,7 @@
 
 Errors are against the exact model with all bounces: over the hemisphere up to 85 degrees, in images of
 the vase, and in sigma and rho when photographs made by the exact model are fitted with the rung.
-`--models` times every model of the library instead.
+`--models` times every model of the library instead, `--series` compares ways to sum the series of `HeTorrance`.
 """
 
 import argparse
@@ -21,6 +21,7 @@ import torchbrdf
 from inverse import Distant, Scene, Sensor, fit, render, usable, vase
 from torchbrdf import BRDF, Cosines
 from torchbrdf.accuracy import RUNGS, Rung, forward_ratios, ladder, reference
+from torchbrdf.accuracy_series import SeriesLadder, series_ladder
 from torchbrdf.testing import random_directions
 
 matplotlib.use("Agg")
@@ -39,6 +40,8 @@ def every_model() -> dict[str, BRDF]:
             found[name] = kind.of(torchbrdf.EON(), dtype=torch.float32)
         elif kind is torchbrdf.TabulatedRoughSurface:
             found[name] = kind(weights=torch.full((16,), 1 / 16))
+        elif kind is torchbrdf.HeTorrance:  # Figure 8 of the paper, lengths in um
+            found[name] = kind(sigma0=0.28, tau=1.77, wavelength=0.5, eta=0.77, k=6.08)
         elif kind not in (torchbrdf.Oriented, torchbrdf.WeightedSum):
             found[name] = kind()
     return found
@@ -89,17 +92,37 @@ def draw(rows: list[dict], front: set[str], machine: str, path: Path) -> None:
     plt.close(figure)
 
 
+def draw_series(table: SeriesLadder, path: Path) -> None:
+    figure, axis = plt.subplots(figsize=(8.5, 4.6), layout="constrained")
+    for row in table.rows:
+        shown = [min(max(error, 1e-8), 2.0) for error in row.largest]
+        label = f"{row.name}, {row.forward:.0f} x Lambert"
+        axis.stairs(shown, table.edges, baseline=None, linewidth=2, label=label)
+    axis.set(xscale="log", yscale="log", xlabel="g", ylabel="largest relative error of the series (float32)")
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3)
+    figure.savefig(path, dpi=90)
+    plt.close(figure)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=Path("output"))
     parser.add_argument("--directions", type=int, default=1000)
     parser.add_argument("--size", type=int, default=64, help="rows of the vase images")
     parser.add_argument("--models", action="store_true", help="forward time of every model, and nothing else")
-    parser.add_argument("--points", type=int, default=1 << 14, help="points a model is timed on, with --models")
+    parser.add_argument("--series", action="store_true", help="schemes for the series of HeTorrance, and nothing else")
+    parser.add_argument("--points", type=int, default=1 << 14, help="points of --models and --series")
     parser.add_argument("--rungs", nargs="*", help="names to keep (all)")
     parser.add_argument("--compiled", action="store_true", help="time the models under torch.compile (minutes)")
     parser.add_argument("--device", default="cpu", help="where to time")
     args = parser.parse_args()
+    args.output.mkdir(parents=True, exist_ok=True)
+    if args.series:
+        table = series_ladder(points=args.points)
+        draw_series(table, args.output / "series.png")
+        print(f"{table.to_markdown()}\n\nFigure: {args.output / 'series.png'}")
+        return
     rungs = [rung for rung in RUNGS if not args.rungs or rung.name in args.rungs]
     directions = random_directions(args.directions, generator=torch.Generator().manual_seed(0))
     cosines = Cosines.of(*(d.to(args.device) for d in directions))
@@ -123,7 +146,6 @@ def main() -> None:
     print("|---|---|---|---|")
     for row in rows:
         print(f"| {row['name']} | {row['image_error']:.2%} | {row['sigma_bias']:.2f} | {row['rho_bias']:.4f} |")
-    args.output.mkdir(parents=True, exist_ok=True)
     (args.output / f"ladder_{kind}.json").write_text(json.dumps({"machine": machine, "rows": rows}, indent=2))
     draw(rows, {row.name for row in table.pareto()}, machine, args.output / f"ladder_{kind}.png")
     print(f"\nFigure: {args.output / f'ladder_{kind}.png'}")

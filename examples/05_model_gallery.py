@@ -28,6 +28,7 @@ SIGMA = {"sigma": tb.sigma_from_degrees(30)}
 SLOPE = {"slope": math.radians(35)}
 GOLD = tb.Conductor(eta=torch.tensor([0.18, 0.42, 1.37]), k=torch.tensor([3.42, 2.35, 1.77]))
 ALONG_X = torch.tensor([1.0, 0.02, 0.03])  # nearly: parallel to no normal of a pixel
+COLOURS = torch.tensor([0.65, 0.55, 0.45])  # [um]
 GLASS = tb.Dielectric(eta=1.5)
 LAMP = torch.tensor([0.5, 0.4, 0.8])
 POLISHED = (tb.Coupled, tb.Dampened, tb.Mirror)
@@ -36,6 +37,11 @@ INCIDENCE = {"tab:blue": 20, "tab:red": 50}  # [deg]
 
 def brushed(brdf: tb.BRDF) -> tb.BRDF:
     return tb.Oriented(brdf, ALONG_X)
+
+
+def aluminium(sigma0: float, tau: float) -> tb.HeTorrance:
+    eta, k = tb.ALUMINIUM(COLOURS)
+    return tb.HeTorrance(sigma0=sigma0, tau=tau, wavelength=COLOURS, eta=eta, k=k)
 
 
 MODELS = {
@@ -83,6 +89,10 @@ MODELS = {
     ),
     "AshikhminShirley\nRd 0.5, Rs 0.1, exponents 10, 200": brushed(
         tb.AshikhminShirley(diffuse=0.5, specular=0.1, exponent_x=10.0, exponent_y=200.0)
+    ),
+    "HeTorrance\nsigma0 0.28, tau 1.77 um, aluminium": aluminium(0.28, 1.77),
+    "HeTorrance\nsigma0 0.5, tau 3 um, n 1.5, blue body": tb.HeTorrance(
+        sigma0=0.5, tau=3.0, wavelength=COLOURS, eta=1.5, diffuse=torch.tensor([0.1, 0.2, 0.4])
     ),
     "TabulatedBRDF\na table of Lambert + GGX, 45 x 45 x 19": tb.TabulatedBRDF.of(
         tb.Lambert(**RHO) + tb.GGX(alpha=0.2, fresnel=GLASS), dtype=torch.float32

@@ -14,8 +14,14 @@ _UNINFORMATIVE = 0.25
 _ONE_SIDED_95 = 1.645
 # A logistic coordinate whose slope has fallen to this share of the domain sits on the bound.
 _FLAT = 1e-5
+# Two positive unknowns so correlated, with relative errors so large, are known as a ratio or a product alone. An
+# effect that fades like 1/x^2 cannot be told from none at 95 % once the relative error is 1/(2 * 1.645); half of that.
+_TIED = 0.999
+_LOOSE = 0.15
 # Weight in a singular direction from which a parameter is named as part of it.
 _INVOLVED = 0.3
+# And up to which it has no part in it.
+_ABSENT = 0.01
 
 
 class Covariance:
@@ -58,16 +64,18 @@ def _pseudo_inverse(matrix: Tensor, tolerance: float) -> tuple[Tensor, Tensor]:
 
 def judge(unknowns: Unknowns, solution: Solution, covariance: Covariance, noise: float) -> tuple[str, str]:
     """Status and reason of a finished fit: a number nobody should trust is not called converged."""
+    tied = _tied(unknowns, covariance, noise) if solution.status != "diverged" else ""
+    if tied:  # a fit that is out of steps has run along them
+        return "not identified", tied if solution.status == "converged" else f"{tied}; {solution.reason}"
     if solution.status != "converged":
         return solution.status, solution.reason + _texels(unknowns, solution, covariance)
     labels = unknowns.shared_labels()
     for direction in covariance.blind:
         involved = [labels[k] for k in (direction.abs() > _INVOLVED).nonzero()[:, 0].tolist()]
-        if len(involved) == 1 and not unknowns.own_entries:
-            return "not identified", f"{involved[0]} changes nothing in the data"
-        others = [entry.name for entry in unknowns.own_entries]
-        names = " from ".join([*involved, *(f"the {name} of each texel" for name in others)])
-        return "not identified", f"the data cannot tell {names}"
+        others = [f"the {entry.name} of each texel" for entry in unknowns.own_entries]
+        alone = len(involved) == 1 and not others
+        names = " from ".join([*involved, *others])
+        return "not identified", f"{names} changes nothing in the data" if alone else f"the data cannot tell {names}"
     errors = covariance.shared.diagonal().sqrt() * noise
     position = 0
     verdicts = []
@@ -81,6 +89,30 @@ def judge(unknowns: Unknowns, solution: Solution, covariance: Covariance, noise:
         if reasons:
             return status, "; ".join(reasons)
     return solution.status, solution.reason + _texels(unknowns, solution, covariance)
+
+
+def _tied(unknowns: Unknowns, covariance: Covariance, noise: float) -> str:
+    """Which two positive shared unknowns the data know by their ratio or product alone; empty if none."""
+    labels = unknowns.shared_labels()
+    domains = [entry.domain for entry in unknowns.shared_entries for _ in range(entry.start.numel())]
+    positive = [k for k, d in enumerate(domains) if isinstance(d, Interval) and math.isinf(d.high)]
+    if len(covariance.blind) == 1:  # of several, any mixture is one
+        direction = covariance.blind[0]
+        involved = (direction.abs() > _ABSENT).nonzero()[:, 0].tolist()
+        if len(involved) == 2 and set(involved) <= set(positive):
+            i, j = involved
+            return _either(labels[i], labels[j], ratio=bool(direction[i] * direction[j] > 0))
+    errors = covariance.shared.diagonal().sqrt()  # of logarithms: relative ones
+    for j in positive:
+        for i in positive[: positive.index(j)]:
+            correlation = covariance.shared[i, j] / (errors[i] * errors[j])
+            if correlation.abs() > _TIED and noise * torch.minimum(errors[i], errors[j]) > _LOOSE:
+                return _either(labels[i], labels[j], ratio=bool(correlation > 0))
+    return ""
+
+
+def _either(first: str, second: str, *, ratio: bool) -> str:
+    return f"the data tell the {'ratio' if ratio else 'product'} of {first} and {second}, and hardly either"
 
 
 def _texels(unknowns: Unknowns, solution: Solution, covariance: Covariance) -> str:

@@ -35,6 +35,8 @@ def fit_measurements(
         model: start values; it is copied, not changed. Its parameters are shared by all samples.
         knee: of `weighted_reflectance`. [1/sr] Infinite, the highest samples decide; of a glossy material those
             are few, and their height that of the instrument's resolution.
+            Errors take the noise to be even in what is compared: noise that is a share of each value asks for a
+            knee below the values that count, or the errors come out too small.
         starts: number of starts; after the model's own, drawn at random over the finite domains.
         seed: of the random starts.
         max_steps: of each start.

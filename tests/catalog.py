@@ -42,7 +42,16 @@ def gold(dtype: torch.dtype) -> Conductor:
 def every_other(dtype: torch.dtype) -> BRDF:
     """The other models in one sum, for one compiled graph."""
     x = {m.name: m for m in OTHERS}
-    names = ["torrance_sparrow, glass", "ggx, brushed", "beckmann", "eon", "hapke", "minnaert", "coupled, glass"]
+    names = [
+        "torrance_sparrow, glass",
+        "ggx, brushed",
+        "beckmann",
+        "eon",
+        "hapke",
+        "minnaert",
+        "coupled, glass",
+        "he_torrance, plastic",
+    ]
     parts = [x[name].make(dtype) for name in names]
     inner = [part.brdf if isinstance(part, Oriented) else part for part in parts]
     total = 0.2 * inner[0]
@@ -216,8 +225,8 @@ OTHERS = [
         lambda dtype: HeTorrance(
             sigma0=number(0.28, dtype),
             tau=number(1.77, dtype),
-            wavelength=torch.tensor([0.65, 0.5], dtype=dtype),
-            eta=torch.tensor([1.49, 0.77], dtype=dtype),
+            wavelength=fixed(torch.tensor([0.65, 0.5], dtype=dtype)),
+            eta=fixed(torch.tensor([1.49, 0.77], dtype=dtype)),  # (1 + k^2)/eta reflects as much at normal incidence
             k=torch.tensor([7.82, 6.08], dtype=dtype),
             diffuse=number(0.02, dtype),  # covers the far tail of the lobe, which float32 cannot hold
         ),
@@ -231,7 +240,7 @@ OTHERS = [
             tau=number(2.0, dtype),
             wavelength=fixed(number(0.55, dtype)),
             eta=number(1.5, dtype),
-            diffuse=torch.tensor([0.28, 0.15], dtype=dtype),
+            diffuse=torch.tensor([0.28, 0.2, 0.15], dtype=dtype),
         ),
         nodes=96,
         float32=FACETS,
@@ -240,8 +249,8 @@ OTHERS = [
         "he_torrance, averaged spike",
         lambda dtype: HeTorrance(
             sigma0=number(0.05, dtype),
-            tau=number(0.7, dtype),
-            wavelength=number(0.55, dtype),
+            tau=fixed(number(0.7, dtype)),  # the spike hardly knows it
+            wavelength=fixed(number(0.55, dtype)),
             eta=number(1.5, dtype),
             solid_angle=1.0,
             directional_diffuse=False,

@@ -9,7 +9,7 @@ README = (Path(__file__).parents[1] / "README.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 
 
-@pytest.mark.parametrize("code", BLOCKS, ids=["library", "pipeline"])
+@pytest.mark.parametrize("code", BLOCKS, ids=["library", "wave optics", "pipeline"])
 def test_code_block_runs(code, capsys):
     names = {}
     exec(compile(code, "README.md", "exec"), names)

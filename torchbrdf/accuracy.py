@@ -191,7 +191,7 @@ def cost(
         saved[rung.name] = _saved_bytes(evaluate) / count
     # all rungs share the code of `evaluate`: with and without gradients, each needs its own compilation
     with torch._dynamo.config.patch(recompile_limit=4 * len(rungs)) if compiled else nullcontext():  # pyright: ignore
-        seconds = [_interleaved_medians(calls, repeats) for calls in (forward, backward)]
+        seconds = [interleaved_medians(calls, repeats) for calls in (forward, backward)]
     unit = [found[rungs[0].name] for found in seconds]
     return {
         rung.name: (seconds[0][rung.name] / unit[0], seconds[1][rung.name] / unit[1], saved[rung.name])
@@ -216,12 +216,12 @@ def forward_ratios(models: Mapping[str, BRDF], cosines: Cosines, *, repeats: int
         return model.evaluate(replace(fresh, vectors=cosines.vectors, tangent=cosines.tangent))
 
     with torch.no_grad():
-        seconds = _interleaved_medians({name: (lambda m=m: call(m), 1) for name, m in models.items()}, repeats, clock)
+        seconds = interleaved_medians({name: (lambda m=m: call(m), 1) for name, m in models.items()}, repeats, clock)
     unit = next(iter(seconds.values()))
     return {name: found / unit for name, found in seconds.items()}
 
 
-def _interleaved_medians(
+def interleaved_medians(
     calls: dict[str, tuple[Callable[[], object], int]], repeats: int, clock: Callable[[], float] = time.perf_counter
 ) -> dict[str, float]:
     """Median seconds a point of each call; they take turns, so that a slower minute slows them all."""

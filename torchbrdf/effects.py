@@ -12,6 +12,7 @@ import torch
 
 from torchbrdf.brdf import BRDF, WeightedSum
 from torchbrdf.fresnel import ConstantFresnel, Fresnel, Perfect
+from torchbrdf.models.he_torrance.module import HeTorrance
 from torchbrdf.models.lambert import Lambert
 from torchbrdf.models.microfacet import GGX, AnisotropicBeckmann, AnisotropicGGX, Beckmann
 from torchbrdf.models.oren_nayar.anisotropic import AnisotropicRoughSurface
@@ -31,8 +32,12 @@ EXACT_SLOPES = "exact integral over slopes"
 MANY_SLOPES = "all slopes of the model"
 FRESNEL_VARIATION = "Fresnel variation"
 ANISOTROPY = "anisotropy"
+SPIKE = "specular spike"
+DIFFRACTION = "directional diffuse"
+BODY = "uniform diffuse"
 EFFECTS = (
     ROUGHNESS, INTERREFLECTION, LATER_BOUNCES, C3_TERM, EXACT_SLOPES, MANY_SLOPES, FRESNEL_VARIATION, ANISOTROPY,
+    SPIKE, DIFFRACTION, BODY,
 )  # fmt: skip
 
 
@@ -70,8 +75,23 @@ def options(model: BRDF) -> dict[str, list[Option]]:
             group: [Option(k.choice, k.skips, _turned(model, k.model)) for k in found]
             for group, found in options(model.brdf).items()
         }
+    if isinstance(model, HeTorrance):
+        return dict(_without_parts(model))
     found = {"rung": list(_rungs(model)), ANISOTROPY: list(_round(model)), FRESNEL_VARIATION: list(_flat(model))}
     return {group: entries for group, entries in found.items() if entries}
+
+
+def _without_parts(model: HeTorrance) -> Iterator[tuple[str, list[Option]]]:
+    """The same surface with one of its parts switched off; none where it is the last."""
+    if len(model.parts) == 1:
+        return
+    names = ("sigma0", "tau", "wavelength", "eta", "k", "diffuse")
+    material: dict[str, Any] = {name: kept(model, name) for name in names}
+    for part, effect in (("specular", SPIKE), ("directional_diffuse", DIFFRACTION), ("uniform_diffuse", BODY)):
+        if part in model.parts:
+            others = {name: name in model.parts and name != part for name in HeTorrance.PARTS}
+            stand_in = HeTorrance(**material, solid_angle=model.solid_angle, **others)
+            yield effect, [Option(f"no {effect} part", (effect,), stand_in)]
 
 
 def _rungs(model: BRDF) -> Iterator[Option]:

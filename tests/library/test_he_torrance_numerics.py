@@ -53,6 +53,16 @@ def test_derivatives_at_sigma0_zero():
     assert torch.autograd.gradgradcheck(lambda s: directional_diffuse(cosines, sigma0=s, **surface), sigma0)
 
 
+def test_only_ratios_of_lengths_count():
+    # raw lengths are logarithms: what one unit more for all of them changes is nothing
+    surface = material(0.05, 0.7, 0.5, 0.77 + 6.08j)
+    model = HeTorrance(**surface, diffuse=doubles([0.02]), solid_angle=0.5)
+    f = model(*random_directions(50, dtype=torch.float64, generator=torch.Generator().manual_seed(0))).sum()
+    raw = [model.raw_sigma0, model.raw_tau, model.raw_wavelength]
+    slopes = torch.stack([g.sum() for g in torch.autograd.grad(f, raw)])
+    assert slopes.sum().abs() < 1e-9 * slopes.abs().max()
+
+
 def test_derivatives_of_the_spike_and_of_the_albedo():
     surface = {name: value.requires_grad_() for name, value in material(0.05, 0.7, 0.5, 0.77 + 6.08j).items()}
     theta = doubles([0.5, 0.9])
@@ -160,7 +170,7 @@ def test_float32(parameters):
     assert f.dtype == torch.float32
     held = reference > 1e-25
     error = (f.double() / reference - 1)[held].abs()
-    allowed = 3e-6 + 40 * torch.finfo(torch.float32).eps * reference[held].log().abs()
+    allowed = 3e-6 + 8 * torch.finfo(torch.float32).eps * reference[held].log().abs()
     assert (error <= allowed).all(), (error / allowed).max()
     # the mirror share: e^-g
     cos = upcast[1][:, 2].abs().float()

@@ -120,7 +120,7 @@ def test_compiles(dtype):
 
 @pytest.mark.parametrize("backend", ["aot_eager", pytest.param("inductor", marks=pytest.mark.slow)])
 def test_others_compile(backend):
-    assert_compiles(every_other(torch.float32), few(16, torch.float32), backend)  # code generation takes 20 to 40 s
+    assert_compiles(every_other(torch.float32), few(16, torch.float32), backend)  # code generation: minutes
 
 
 def assert_compiles(brdf: BRDF, directions: laws.Directions, backend: str) -> None:

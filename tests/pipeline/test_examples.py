@@ -82,6 +82,13 @@ def test_every_model_is_timed(run):
     assert float(printed["RoughSurface"]) > float(printed["OrenNayar"])
 
 
+def test_schemes_of_the_series_are_measured_and_drawn(run, tmp_path):
+    printed = run("03_accuracy_vs_time.py", "--series", "--points", 2000, "--output", tmp_path)
+    shipped = next(line for line in printed.splitlines() if line.startswith("| as shipped"))
+    assert "| 0.00% |" in shipped
+    assert (tmp_path / "series.png").exists()
+
+
 def test_figures_of_the_paper(run, tmp_path):
     printed = run("04_paper_figures.py", "--size", 16, "--points", 9, "--output", tmp_path).split()
     assert len(printed) == 12
@@ -101,6 +108,22 @@ def test_gallery_leaves_no_model_out():
     library = {name for name in torchbrdf.__all__ if isinstance(getattr(torchbrdf, name), type)}
     models = {name for name in library if issubclass(getattr(torchbrdf, name), BRDF)}
     assert models - shown <= {"BRDF", "ImageBRDF", "LinearBRDF"}
+
+
+def test_he_torrance_figures_say_which_claims_hold(run, tmp_path):
+    printed = run("06_he_torrance_figures.py", "--points", 41, "--output", tmp_path).splitlines()
+    verdict = {line.rsplit(": ", 1)[0]: line.rsplit(": ", 1)[1] for line in printed if line.startswith("Figure")}
+    assert {v for claim, v in verdict.items() if claim.startswith("Figure 9")} == {"does NOT hold"}
+    assert {v for claim, v in verdict.items() if not claim.startswith("Figure 9")} == {"holds"}
+    assert len(verdict) == 6
+    assert "exceeds the energy bound" in printed[0]
+    assert (tmp_path / "he_torrance_lobes.png").exists()
+
+
+def test_cylinders_of_growing_roughness(run, tmp_path):
+    assert len(run("06_he_torrance_cylinders.py", "--size", 10, "--output", tmp_path).splitlines()) == 9
+    with Image.open(tmp_path / "he_torrance_cylinders.png") as picture:
+        assert picture.size[0] > 600
 
 
 def test_paints_are_fitted_and_called_glossy(run, tmp_path):

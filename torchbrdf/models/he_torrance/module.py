@@ -67,6 +67,8 @@ class HeTorrance(BRDF):
     Source: He, Torrance, Sillion & Greenberg 1991.
     """
 
+    PARTS = ("specular", "directional_diffuse", "uniform_diffuse")
+
     sigma0: Constrained = Constrained(HEIGHT)
     tau: Constrained = Constrained(LENGTH)
     wavelength: Constrained = Constrained(WAVELENGTH)
@@ -103,6 +105,12 @@ class HeTorrance(BRDF):
         self._warn_of_units()
         if not is_per_texel(self):
             self._warn_of_energy()
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Names of the parts included."""
+        included = (self._specular, self._lobe, self._matte)
+        return tuple(name for name, there in zip(self.PARTS, included, strict=True) if there)
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         found = {}

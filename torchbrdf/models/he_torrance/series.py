@@ -35,7 +35,7 @@ class _Scheme(NamedTuple):
 
 
 _SCHEMES = {
-    torch.float32: _Scheme((0.3, 1.5, 6.0, 16.0, 34.0), ((80.0, 5), (600.0, 4), (math.inf, 2)), 1e-8),
+    torch.float32: _Scheme((0.3, 1.5, 6.0, 14.0, 24.0), ((34.0, 8), (80.0, 5), (600.0, 4), (math.inf, 2)), 1e-8),
     torch.float64: _Scheme((0.3, 1.5, 6.0, 16.0, 34.0, 70.0), ((200.0, 9), (1000.0, 6), (math.inf, 4)), 1e-13),
 }
 _HIGHEST_DERIVATIVE = 2
@@ -200,15 +200,26 @@ def _sum(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, m: float, terms
     most = max(n for n, _ in orders)
     totals = [torch.zeros_like(g) for _ in orders]
     above: dict[int, list[Tensor]] = {q: [] for _, q in orders}
+    room = torch.empty_like(t)  # one for all terms: to take fresh memory costs more than to compute
     for j in range(terms + most - 1, -1, -1):
-        decay = exp_or_zero(t * (-1 / (j + 1)))
+        decay = exp_or_zero(torch.mul(t, -1 / (j + 1), out=room))
+        weight = unit**j / math.factorial(j) if j < terms else 0.0
+        if most == 0:
+            for total, (_, q) in zip(totals, orders, strict=True):
+                total.mul_(scaled).add_(decay, alpha=weight * _share(j, q))
+            continue
         for q in above:
-            differences = [decay * ((-1) ** q / (j + 1) ** (2 + q))]
+            differences = [decay * _share(j, q)]
             for higher in above[q][:most]:
                 differences.append(higher - differences[-1])
             above[q] = differences
         if j < terms:
             for total, (n, q) in zip(totals, orders, strict=True):
-                total.mul_(scaled).add_(above[q][n], alpha=unit**j / math.factorial(j))
-    weight = torch.exp(-g)
-    return [total * weight for total in totals]
+                total.mul_(scaled).add_(above[q][n], alpha=weight)
+    over_all = torch.exp(-g)
+    return [total.mul_(over_all) for total in totals]
+
+
+def _share(j: int, q: int) -> float:
+    """What stands before e^(-t/(j + 1)) in the derivative of h(j), q times by t."""
+    return (-1.0) ** q / (j + 1) ** (2 + q)
