@@ -55,7 +55,7 @@ def three_scenes(size: int) -> dict[str, tuple[Scene, BRDF]]:
             Scene(vase(size, size, samples=2), [Distant.from_angle(20)]),
             clay(0.7, 30),
         ),
-        "dark smooth vase from afar, a raised lamp": (Scene(from_afar, [Point(30 * up, 1000.0)]), clay(0.15, 5)),
+        "dark smooth vase, a raised lamp": (Scene(from_afar, [Point(30 * up, 1000.0)]), clay(0.15, 5)),
         "glossy ball on a table, the sun": (
             Scene(orthographic(table, size, size, samples=2), [Disc(up, 0.01, rings=2)]),
             clay(0.5, 20, gloss=True),
