@@ -8,7 +8,7 @@ fit: .venv/ready
 	$(BIN)/python examples/01_fit_vase.py --output output
 
 test: .venv/ready
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n auto --maxprocesses 4
 
 lint: .venv/ready
 	$(BIN)/ruff check .

@@ -7,6 +7,9 @@ from materials import Model
 
 from torchbrdf.testing import Directions, random_directions
 
+# The workers share the cores; threads of their own would wait for each other.
+torch.set_num_threads(1)
+
 
 @pytest.fixture(params=MODELS, ids=lambda model: model.name)
 def model(request: pytest.FixtureRequest) -> Model:

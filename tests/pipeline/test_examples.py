@@ -156,3 +156,13 @@ def test_laws_catch_the_broken_brdfs_and_pass_the_corrected_one(run):
     in_degrees, in_radians = (float(line.split()[-1]) for line in printed[-2:])
     assert in_degrees > 0.2
     assert in_radians < 1e-6
+
+
+def test_plans_of_three_scenes_and_of_a_grid(run, tmp_path):
+    printed = run("07_only_what_matters.py", "--size", 24, "--tolerance", 0.02, "--output", tmp_path)
+    shares = [float(line.split()[5].rstrip("%;")) for line in printed.splitlines() if line.startswith("largest error")]
+    assert len(shares) == 3
+    assert max(shares) < 2
+    assert (tmp_path / "only_what_matters.png").exists()
+    printed = run("07_only_what_matters.py", "--size", 24, "--grid", 2)
+    assert [line.split()[1] for line in printed.splitlines()] == ["10.0%:", "1.0%:", "0.1%:"]
