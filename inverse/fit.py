@@ -54,7 +54,8 @@ def fit(
     Args:
         scene: geometry, lights, exposure and point-spread function, all taken as known.
         photographs: sensor values (image, rows, columns, channel), linear, full scale 1.
-        plan: what to simulate of the scene, and the stand-in to fit unless a model is given.
+        plan: what to simulate of the scene, and the stand-in to fit unless a model is given. The parameters of a
+            sum's parts keep the names they had before parts were left out.
         model: start values; it is copied, not changed. Per-texel parameters have one entry for each
             masked point of the surface, in row-major order, and are fitted pixel by pixel.
         valid: samples that may be used, bool (image, rows, columns).
@@ -101,7 +102,17 @@ def fit(
         model, unknowns, residual, samples=samples, unit="of full scale",
         starts=starts, seed=seed, max_steps=max_steps, throw=throw, began=began,
     )  # fmt: skip
-    return replace(found, plan=plan)
+    if plan is None:
+        return found
+    named = plan.original_name
+    return replace(
+        found,
+        plan=plan,
+        parameters={named(name): value for name, value in found.parameters.items()},
+        standard_error={named(name): value for name, value in found.standard_error.items()},
+        names=[named(name) for name in found.names],
+        units={named(name): unit for name, unit in found.units.items()},
+    )
 
 
 def search(

@@ -65,7 +65,8 @@ def footprints(surface: Surface, detail: Tensor | None = None) -> Footprints:
         if detail.shape != (rows, columns) or detail.dtype != torch.bool:
             found = f"{detail.dtype} {tuple(detail.shape)}"
             raise ValueError(f"detail must be bool of shape {(rows, columns)}; found {found}.")
-        merged = ~detail & (surface.coverage() == 1)
+        if s > 1:
+            merged = ~detail & (surface.coverage() == 1)
     kept = mask & ~merged.repeat_interleave(s, 0).repeat_interleave(s, 1)
     upright = _unit(pixel_average(surface.normals, s)[merged])
     middle = pixel_average(surface.points, s)[merged]

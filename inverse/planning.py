@@ -1,5 +1,6 @@
 """Which effects a scene calls for, measured on a sample of its own pixels."""
 
+import math
 import time
 from collections.abc import Callable
 from typing import NamedTuple
@@ -80,9 +81,11 @@ def plan(
         verdicts[FOOTPRINT] = (True, f"in part; {done[FOOTPRINT]}")
     verdicts |= {name: (False, reason) for name, reason in absent.items()}
     rows = [_row(name, alone.get(name), verdicts.get(name), budget) for name in (*SCENE_EFFECTS, *simulated(model))]
+    planned, parts = compact(stand_in)
     return Plan(
-        scene=left, model=compact(stand_in), effects=(*rows, *_others(full, model)), of=of, tolerance=tolerance,
-        limit=measure.limit, error=error(sample, stand_in), safety=safety, pilot=int(chosen.sum()),
+        original=scene, scene=left, model=planned, parts=parts, effects=(*rows, *_others(full, model)),
+        of=of, tolerance=tolerance, limit=measure.limit, error=error(sample, stand_in),
+        safety=safety, pilot=int(chosen.sum()),
     )  # fmt: skip
 
 
@@ -167,11 +170,11 @@ def _others(scene: Scene, model: BRDF) -> list[Effect]:
 def _check(tolerance: float, of: str, safety: float, pixels: int, model: BRDF) -> None:
     if of not in ("radiance", "sigma"):
         raise ValueError(f'plan: of must be "radiance" or "sigma"; found {of!r}.')
-    if not tolerance > 0:
+    if not 0 < tolerance < math.inf:
         unit = "share of the peak radiance" if of == "radiance" else "share of sigma's standard error"
-        raise ValueError(f"plan: tolerance must be positive [{unit}]; found {tolerance}.")
-    if not safety >= 1:
-        raise ValueError(f"plan: safety must be at least 1; found {safety}.")
+        raise ValueError(f"plan: tolerance must be positive and finite [{unit}]; found {tolerance}.")
+    if not 1 <= safety < math.inf:
+        raise ValueError(f"plan: safety must be at least 1 and finite; found {safety}.")
     if not isinstance(pixels, int) or pixels < 1:
         raise ValueError(f"plan: pixels must be a whole number of at least 1; found {pixels}.")
     if is_per_texel(model):

@@ -101,7 +101,9 @@ def exchanged(where: Footprints, lights: tuple[Light, ...]) -> Callable[[BRDF], 
 def passed_on(model: BRDF, images: Tensor) -> Tensor:
     """sum_b rho^(b + 1) T_b/pi (point, channel) of irradiances T_b (bounce, point, channel) among white parts."""
     if is_per_texel(model):
-        raise ValueError("light between parts needs one material: the model has parameters per texel.")
+        raise ValueError(
+            "light between parts needs one material: the model has parameters per texel; set Scene.between_parts=False."
+        )
     rho = white_sky_albedo(model, images)
     total, power = torch.zeros_like(images[0]), rho
     for image in images:

@@ -204,12 +204,12 @@ def _of_sum(model: WeightedSum) -> Iterator[tuple[str, list[Option]]]:
             yield f"{group} of {name}", [Option(*entry) for entry in zip(choices, skips, models, strict=True)]
 
 
-def compact(model: BRDF) -> BRDF:
-    """A sum without the parts that were left out; any other model as it is."""
+def compact(model: BRDF) -> tuple[BRDF, tuple[int, ...]]:
+    """A sum without the parts that were left out, and the places the others had; any other model as it is, and ()."""
     if not isinstance(model, WeightedSum):
-        return model
+        return model, ()
     lit = [k for k, part in enumerate(model.parts) if not _is_black(part)]  # pyright: ignore[reportArgumentType]
-    return _sum_of(model, [model.parts[k] for k in lit], lit)  # pyright: ignore[reportArgumentType]
+    return _sum_of(model, [model.parts[k] for k in lit], lit), tuple(lit)  # pyright: ignore[reportArgumentType]
 
 
 def _is_black(part: BRDF) -> bool:

@@ -103,7 +103,8 @@ def test_parts_of_a_sum():
     directions = random_directions(20, dtype=D, generator=torch.Generator().manual_seed(1))
     dropped = groups["part 2"][0].model
     assert [type(part) for part in dropped.parts] == [OrenNayar, Lambert]
-    alone = compact(dropped)
+    alone, places = compact(dropped)
+    assert places == (0,)
     assert [type(part) for part in alone.parts] == [OrenNayar]
     torch.testing.assert_close(alone(*directions), 0.9 * material(OrenNayar)(*directions))
     torch.testing.assert_close(dropped(*directions), alone(*directions))
@@ -142,4 +143,4 @@ def test_models_without_stand_ins():
     for model in (Lambert(), EON(), QualitativeOrenNayar()):
         assert options(model) == {}
         assert simulated(model) == ()
-        assert compact(model) is model
+        assert compact(model) == (model, ())

@@ -96,11 +96,11 @@ MODELS = {
     "general": lambda: EON(albedo=number(0.7), roughness=number(0.5)),
     "with a mirror lobe": lambda: Coupled(albedo=number(0.6)),
 }
-SENSOR = Sensor(exposure=1.7, psf_sigma=0.8)
 
 
+@pytest.mark.parametrize(("samples", "psf"), [(2, 0.8), (3, 0.0), (1, 0.0)])
 @pytest.mark.parametrize("name", MODELS)
-def test_a_fit_predicts_what_is_rendered(name):
+def test_a_fit_predicts_what_is_rendered(name, samples, psf):
     """With everything on: shadows, parts, a disc, a lamp, ambient light, merged pixels, focus."""
     model = MODELS[name]()
     surface = vase(24, 24, samples=2, dtype=D)
@@ -108,10 +108,11 @@ def test_a_fit_predicts_what_is_rendered(name):
         [RAISED, Ambient(0.05)],
         [Disc(torch.tensor([0.5, 0.5, 1.0]), 0.1), Point(torch.tensor([1.0, 2, 3]), 4.0)],
     ]
-    scene = Scene(surface, lights, SENSOR, between_parts=True, detail=torch.rand(24, 24) < 0.5)
+    sensor = Sensor(exposure=1.7, psf_sigma=psf)
+    scene = Scene(surface, lights, sensor, between_parts=True, detail=torch.rand(24, 24) < 0.5)
     pixels = surface.coverage() == 1
     predicted = predictor(scene, model, pixels, per_texel=False)(dict(model.named_parameters()))
-    recorded = SENSOR.focus(render(scene, model)) * SENSOR.exposure
+    recorded = sensor.focus(render(scene, model)) * sensor.exposure
     torch.testing.assert_close(predicted, recorded[:, pixels].expand_as(predicted), rtol=1e-9, atol=1e-12)
 
 

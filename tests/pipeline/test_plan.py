@@ -211,28 +211,29 @@ def test_gradients_follow_the_plan():
 SENSOR = Sensor(exposure=3.0, read_noise=0.01)
 
 
-@pytest.mark.parametrize("sigma", [0.1, 0.6])
-def test_plan_of_sigma_keeps_the_answer(sigma):
-    """Photographs with everything on, fitted as planned: the bias is within the asked share of the standard error."""
-    scene = Scene(sphere(48, 48, samples=2), [FRONT, Distant.from_angle(50)], SENSOR)
-    truth = clay(0.7, sigma)
-    found = plan(scene, truth, 1.0, of="sigma")
-    photographs = SENSOR.exposure * render(everything(scene), truth).detach()
-    result = fit(scene, photographs, plan=found)
-    assert result.plan is found
-    noisy = SENSOR.expose(render(everything(scene), truth), torch.Generator().manual_seed(0)).detach()
-    error = fit(scene, noisy, clay(0.6, sigma)).standard_error["sigma"]
-    assert abs(float(result.parameters["sigma"]) - sigma) < 1.0 * float(error)
-    # the limit is that share of the standard error a fit reports
-    assert found.limit == pytest.approx(float(error), rel=0.25)
+def test_parts_keep_their_names_in_a_fit():
+    scene = Scene(sphere(32, 32), [FRONT, OBLIQUE])
+    model = WeightedSum([GGX(alpha=0.5), OrenNayar(albedo=fixed(0.7), sigma=0.5)], [1e-4, 1.0])
+    found = plan(scene, model, 0.01)
+    assert found.skipped()[0] != "part 2"
+    assert not found.simulates("part 1")
+    result = fit(scene, render(scene, model).detach(), plan=found)
+    assert float(result.parameters["parts.1.sigma"]) == pytest.approx(0.5, abs=0.01)
+    assert "parts.0.sigma" not in result.parameters
 
 
-def test_plan_of_sigma_drops_more_when_there_is_more_noise():
-    scene = Scene(sphere(48, 48), [FRONT, Distant.from_angle(50)], SENSOR)
-    loud = replace(scene, sensor=replace(SENSOR, read_noise=10.0))
-    kinds = [type(plan(k, clay(0.7, 0.3), 0.5, of="sigma").model) for k in (scene, loud)]
-    assert kinds[0] in (RoughSurface, FastRoughSurface)
-    assert kinds[1] not in (RoughSurface, FastRoughSurface)
+def test_a_plan_follows_the_sensor_and_no_other_scene():
+    scene = Scene(sphere(24, 24), [OBLIQUE])
+    found = plan(scene, Lambert(albedo=0.7), 0.1)
+    brighter = Scene(sphere(24, 24), [OBLIQUE], Sensor(exposure=2.0))
+    photographs = 2 * render(brighter, Lambert(albedo=0.4)).detach()
+    assert float(fit(brighter, photographs, plan=found).parameters["albedo"]) == pytest.approx(0.4, rel=1e-5)
+    for other in (Scene(sphere(24, 24, radius=0.5), [OBLIQUE]), Scene(sphere(24, 24), [FRONT])):
+        with pytest.raises(ValueError, match="made for a scene with other"):
+            render(other, found)
+    noisy = plan(replace(scene, sensor=SENSOR), OrenNayar(albedo=0.5, sigma=0.4), 1.0, of="sigma")
+    with pytest.raises(ValueError, match="the plan of sigma was made for"):
+        render(scene, noisy)
 
 
 def test_fit_with_a_plan_may_take_another_model():
@@ -246,23 +247,29 @@ def test_fit_with_a_plan_may_take_another_model():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: plan(Scene(sphere(8, 8), [FRONT]), clay(), 0.0), r"tolerance must be positive \[share of the peak"),
+        (
+            lambda: plan(Scene(sphere(8, 8), [FRONT]), clay(), 0.0),
+            r"positive and finite \[share of the peak",
+        ),
         (lambda: plan(Scene(sphere(8, 8), [FRONT]), clay(), 0.1, of="rho"), 'of must be "radiance" or "sigma"'),
-        (lambda: plan(Scene(sphere(8, 8), [FRONT]), clay(), 0.1, safety=0.5), "safety must be at least 1; found 0.5"),
+        (
+            lambda: plan(Scene(sphere(8, 8), [FRONT]), clay(), 0.1, safety=0.5),
+            "at least 1 and finite; found 0.5",
+        ),
         (lambda: plan(Scene(sphere(8, 8), [FRONT]), clay(), 0.1, pixels=0), "pixels must be a whole number"),
         (lambda: plan(Scene(sphere(8, 8), [FRONT]), clay(), 0.1, of="sigma"), "give the sensor its noise"),
         (
             lambda: plan(Scene(sphere(8, 8), [FRONT], SENSOR), Lambert(), 0.1, of="sigma"),
             "needs a model with a trained sigma; found Lambert",
         ),
-        (lambda: plan(Scene(sphere(8, 8), [Distant.from_angle(180)]), Lambert(), 0.1), "no light reaches the object"),
+        (lambda: plan(Scene(sphere(8, 8), [Distant.from_angle(180)]), Lambert(), 0.1), "the radiance is 0 everywhere"),
         (
             lambda: plan(Scene(sphere(8, 8), [FRONT]), Lambert(albedo=torch.full((9, 1), 0.5)), 0.1),
             "parameters per texel",
         ),
         (
             lambda: render(Scene(sphere(8, 8), [FRONT]), plan(Scene(sphere(16, 16), [FRONT]), Lambert(), 0.1)),
-            r"the plan is for \(images, rows, columns\) = \(1, 16, 16\) and the scene has \(1, 8, 8\)",
+            "made for a scene with other surface",
         ),
     ],
 )

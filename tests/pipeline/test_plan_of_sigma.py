@@ -1,0 +1,66 @@
+"""Plans measured by the sigma that a fit would find."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from inverse import Distant, Scene, Sensor, everything, fit, plan, plane, render, sphere
+from torchbrdf import FastRoughSurface, OrenNayar, RoughSurface, TorranceSparrow, fixed
+
+FRONT, OBLIQUE = Distant.from_angle(0), Distant.from_angle(20)
+
+
+def clay(rho=0.7, sigma=0.6):
+    return RoughSurface(albedo=rho, sigma=sigma, bounces="all", nodes=8)
+
+
+SENSOR = Sensor(exposure=3.0, read_noise=0.01)
+
+
+@pytest.mark.parametrize("sigma", [0.1, 0.6])
+def test_plan_of_sigma_keeps_the_answer(sigma):
+    """Photographs with everything on, fitted as planned: the bias is within the asked share of the standard error."""
+    scene = Scene(sphere(48, 48, samples=2), [FRONT, Distant.from_angle(50)], SENSOR)
+    truth = clay(0.7, sigma)
+    found = plan(scene, truth, 1.0, of="sigma")
+    photographs = SENSOR.exposure * render(everything(scene), truth).detach()
+    result = fit(scene, photographs, plan=found)
+    assert result.plan is found
+    noisy = SENSOR.expose(render(everything(scene), truth), torch.Generator().manual_seed(0)).detach()
+    error = fit(scene, noisy, clay(0.6, sigma)).standard_error["sigma"]
+    assert abs(float(result.parameters["sigma"]) - sigma) < 1.0 * float(error)
+    # the limit is that share of the standard error a fit reports
+    assert found.limit == pytest.approx(float(error), rel=0.25)
+
+
+def test_plan_of_sigma_keeps_the_sigma_of_every_part():
+    """Two parts, each with a sigma, and a weight that says the same as an albedo."""
+    scene = Scene(sphere(32, 32, samples=2), [FRONT, OBLIQUE], SENSOR)
+    model = 1.0 * OrenNayar(albedo=0.5, sigma=0.4) + 0.1 * TorranceSparrow(sigma=0.3)
+    found = plan(scene, model, 1.0, of="sigma")
+    sizes = {effect.name: effect.size for effect in found.effects}
+    assert sizes["part 1"] >= 0.4 - 1e-6
+    assert sizes["part 2"] >= 0.3 - 1e-6
+    assert sizes["roughness of part 1"] >= 0.4 - 1e-6
+    assert found.simulates("part 1")
+    assert found.simulates("part 2")
+
+
+def test_plan_of_sigma_where_all_else_is_known():
+    scene = Scene(sphere(32, 32), [FRONT, OBLIQUE], SENSOR)
+    found = plan(scene, OrenNayar(albedo=fixed(0.5), sigma=0.4), 1.0, of="sigma")
+    assert next(k.size for k in found.effects if k.name == "roughness") == pytest.approx(0.4)
+
+
+def test_one_image_of_a_plane_tells_no_sigma():
+    with pytest.raises(ValueError, match="do not determine sigma"):
+        plan(Scene(plane(12, 12), [OBLIQUE], SENSOR), OrenNayar(albedo=0.5, sigma=0.4), 1.0, of="sigma")
+
+
+def test_plan_of_sigma_drops_more_when_there_is_more_noise():
+    scene = Scene(sphere(48, 48), [FRONT, Distant.from_angle(50)], SENSOR)
+    loud = replace(scene, sensor=replace(SENSOR, read_noise=10.0))
+    kinds = [type(plan(k, clay(0.7, 0.3), 0.5, of="sigma").model) for k in (scene, loud)]
+    assert kinds[0] in (RoughSurface, FastRoughSurface)
+    assert kinds[1] not in (RoughSurface, FastRoughSurface)
