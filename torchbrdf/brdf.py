@@ -168,12 +168,16 @@ class ImageBRDF(LinearBRDF):
     def _seen_by(self, coefficients: Tensor, cosines: Cosines) -> Tensor:
         """Images times coefficients (..., channel, K), without keeping the images."""
         coordinates = self.coordinates(cosines)
+        dtype = torch.promote_types(coefficients.dtype, cosines.light.dtype)
+        coefficients = coefficients.to(dtype)
         if coefficients.ndim == 2:
-            return _in_pieces(lambda *c: self.images(*c) @ coefficients.mT, coordinates)
+            return _in_pieces(lambda *c: self.images(*c).to(dtype) @ coefficients.mT, coordinates)
         shape = torch.broadcast_shapes(coordinates[0].shape, coefficients.shape[:-2])
         rows = coefficients.expand(*shape, *coefficients.shape[-2:])
         wide = tuple(c.expand(shape) for c in coordinates)
-        return _in_pieces(lambda row, *c: torch.einsum("...k,...ck->...c", self.images(*c), row), (rows, *wide))
+        return _in_pieces(
+            lambda row, *c: torch.einsum("...k,...ck->...c", self.images(*c).to(dtype), row), (rows, *wide)
+        )
 
 
 class WeightedSum(BRDF):

@@ -69,3 +69,15 @@ def test_a_grain_is_rendered_and_read_from_photographs():
     torch.testing.assert_close(image[mask], values * (normal @ toward)[:, None])
     found = fit(scene, image[None], grooved(0.5, 0.3))
     assert found.parameters["brdf.slope"].item() == pytest.approx(0.6, abs=1e-5)
+
+
+def test_material_and_surface_of_two_dtypes_meet_in_the_wider():
+    """As with any other model: a float32 material on a float64 surface is the float64 one to float32 digits."""
+    scene = Scene(sphere(16, 16, dtype=torch.float64), [Distant.from_angle(20)])
+    narrow, wide = (
+        RoughSurface(albedo=torch.tensor(0.7, dtype=dtype), sigma=torch.tensor(0.6, dtype=dtype))
+        for dtype in (torch.float32, torch.float64)
+    )
+    found = render(scene, narrow)
+    assert found.dtype == torch.float64
+    torch.testing.assert_close(found, render(scene, wide), rtol=1e-5, atol=1e-7)
