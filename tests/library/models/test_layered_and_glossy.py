@@ -4,6 +4,7 @@ import math
 
 import pytest
 import torch
+from probes import COS, albedo, doubles, few, held
 from scipy.integrate import quad
 from torch.testing import assert_close
 
@@ -29,27 +30,6 @@ from torchbrdf import (
     trainable,
 )
 from torchbrdf import testing as laws
-
-COS = [0.05, 0.3, 0.8, 1.0]
-
-
-def doubles(x):
-    return torch.tensor(x, dtype=torch.float64)
-
-
-def held(x):
-    return fixed(doubles(x))
-
-
-def albedo(brdf, cos, nodes=48):
-    """By quadrature through `forward`, channel 0."""
-    with torch.no_grad():
-        return float(laws._directional_albedo(brdf, math.acos(cos), nodes)[0])
-
-
-def few(n=200, max_angle=85.0):
-    generator = torch.Generator().manual_seed(5)
-    return laws.random_directions(n, dtype=torch.float64, generator=generator, max_angle=math.radians(max_angle))
 
 
 @pytest.mark.parametrize("exponent", [1.0, 20.0, 200.0])

@@ -8,6 +8,7 @@ import math
 import pytest
 import torch
 from numpy.polynomial.legendre import leggauss
+from probes import COS, albedo, doubles, few, held
 from scipy.integrate import quad
 from torch.testing import assert_close
 
@@ -36,34 +37,12 @@ from torchbrdf import (
     lambert_sphere_fast,
     minnaert,
 )
-from torchbrdf import testing as laws
 from torchbrdf.models.planetary import lambert_sphere_phase
-
-COS = [0.05, 0.3, 0.8, 1.0]
-
-
-def doubles(x):
-    return torch.tensor(x, dtype=torch.float64)
-
-
-def held(x):
-    return fixed(doubles(x))
-
-
-def albedo(brdf, cos, nodes=48):
-    """By quadrature through `forward`, channel 0."""
-    with torch.no_grad():
-        return float(laws._directional_albedo(brdf, math.acos(cos), nodes)[0])
 
 
 def white_sky(brdf, nodes=40):
     x, w = leggauss(nodes)
     return sum(float(wi) * c * albedo(brdf, c, 24) for c, wi in zip((1 + x) / 2, w, strict=True))
-
-
-def few(n=200, max_angle=85.0):
-    generator = torch.Generator().manual_seed(5)
-    return laws.random_directions(n, dtype=torch.float64, generator=generator, max_angle=math.radians(max_angle))
 
 
 @pytest.mark.parametrize("k", [0.5, 1.0, 1.7])
