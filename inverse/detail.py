@@ -31,7 +31,7 @@ def details(scene: Scene, model: BRDF) -> Iterator[tuple[str, Callable[[Scene], 
         bend = _bend(render(replace(scene, detail=none), model))
     edge = _shadow_edges(scene, footprints(surface, none))
     rest = full & ~edge
-    signs = [bend.double(), _spread(surface).double()]
+    signs = [bend.double(), spread_of_normals(surface).double()]
     for share in _SHARES if rest.any() else ():
         above = [sign > torch.quantile(sign[rest], share) for sign in signs]
         detail = full & (edge | above[0] | above[1])
@@ -49,14 +49,14 @@ def _bend(images: Tensor) -> Tensor:
     return (across.abs() + along.abs()).amax((0, 1))
 
 
-def _spread(surface: Surface) -> Tensor:
+def spread_of_normals(surface: Surface) -> Tensor:
     """How much the normals inside each pixel differ: 1 less the length of their mean (rows, columns)."""
     return 1 - pixel_average(surface.normals, surface.samples).norm(dim=-1)
 
 
 def _shadow_edges(scene: Scene, where: Footprints) -> Tensor:
     """Pixels (rows, columns) that the edge of an attached or a cast shadow may cross."""
-    spread = _spread(scene.surface)
+    spread = spread_of_normals(scene.surface)
     edge = torch.zeros_like(spread, dtype=torch.bool)
     for light in beams(scene):
         arrival = next(arrivals(light, where if scene.shadows else replace(where, solid=None)))

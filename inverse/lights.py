@@ -9,6 +9,8 @@ import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
+from torchbrdf import any_tangent
+
 
 class Arrival(NamedTuple):
     """Light that reaches every point from one direction.
@@ -114,8 +116,7 @@ class Disc:
         edge = math.cos(self.half_angle)
         nodes, weights = leggauss(self.rings)
         axis = self.direction.double()
-        across = torch.linalg.cross(axis, torch.eye(3, dtype=torch.float64)[axis.abs().argmin()])
-        across = across / across.norm()
+        across = any_tangent(axis)
         turned = torch.linalg.cross(axis, across)
         count = 4 * self.rings
         for node, weight in zip(nodes, weights, strict=True):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from inverse.detail import borders
+from inverse.detail import borders, spread_of_normals
 from inverse.geometry import pixel_average
 from inverse.scene import Scene
 from inverse.simplify import beams
@@ -34,8 +34,7 @@ def pilot(scene: Scene, count: int, seed: int, *, extremes: bool) -> tuple[Scene
     rank = torch.empty_like(by_stratum)
     rank[by_stratum] = torch.cat([torch.arange(int(k)) for k in sizes])
     if extremes:
-        flatness = pixel_average(surface.normals, surface.samples).norm(dim=-1)[shown][order]
-        by_curvature = flatness.argsort()
+        by_curvature = spread_of_normals(surface)[shown][order].argsort(descending=True)
         places = torch.arange(len(order))
         first = torch.zeros_like(sizes).scatter_reduce(0, stratum[by_curvature], places, "amin", include_self=False)
         rank[by_curvature[first]] = -1

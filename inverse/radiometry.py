@@ -7,11 +7,12 @@ import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
+from inverse.arriving import direct_irradiance
 from inverse.footprints import footprints
 from inverse.geometry import Surface
-from inverse.lights import Ambient, Light
-from inverse.shading import arrivals, radiance
-from torchbrdf import BRDF
+from inverse.lights import Light
+from inverse.shading import radiance
+from torchbrdf import BRDF, any_tangent
 
 
 def solid_angle_of_cone(half_angle: float) -> float:
@@ -42,16 +43,7 @@ def irradiance(surface: Surface, lights: tuple[Light, ...]) -> Tensor:
     pi L under ambient light.
     """
     where = footprints(surface)
-    normals = where.normals
-    total = normals.new_zeros(len(normals), 1)
-    for light in lights:
-        if isinstance(light, Ambient):
-            total = total + math.pi * torch.atleast_1d(torch.as_tensor(light.radiance)).to(normals)
-            continue
-        for arrival in arrivals(light, where):
-            cosine = (normals * arrival.direction).sum(-1, keepdim=True).clamp(min=0)
-            total = total + cosine * arrival.irradiance
-    return total
+    return direct_irradiance(lights, where.points, where.normals, where.solid)
 
 
 def exitance(model: BRDF, surface: Surface, lights: tuple[Light, ...], *, nodes: int = 16) -> Tensor:
@@ -62,9 +54,7 @@ def exitance(model: BRDF, surface: Surface, lights: tuple[Light, ...], *, nodes:
     """
     where = footprints(surface)
     normals = where.normals
-    axes = torch.nn.functional.one_hot(normals.abs().argmin(-1), 3).to(normals)
-    across = torch.linalg.cross(normals, axes)
-    across = across / across.norm(dim=-1, keepdim=True)
+    across = any_tangent(normals)
     turned = torch.linalg.cross(normals, across)
     total = normals.new_zeros(len(normals), 1)
     for x, weight in zip(*leggauss(nodes), strict=True):

@@ -18,12 +18,12 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
+from inverse.arriving import direct_irradiance
 from inverse.exchange import Exchange, PairExchange, RingExchange
-from inverse.lights import Ambient, Light
+from inverse.lights import Light
 from inverse.relief import HeightField
 from inverse.solids import Solid
 from inverse.turned import Revolution
-from inverse.visibility import distance_to, shadowless, unshadowed
 
 _PATCHES = 16384  # of a solid of revolution
 _PAIRED_PATCHES = 1500  # of other solids, where every pair counts
@@ -70,7 +70,7 @@ def bounced(
     once, twice = float(exchange.share.max()), float(exchange.carry(exchange.share[:, None]).max())
     if not twice < 1:
         raise ValueError(f"patches must be more: two bounces between them keep {twice:.2f} >= 1 of the light.")
-    direct = direct_irradiance(exchange, lights)
+    direct = direct_irradiance(lights, *exchange.patches[:2], solid, 1 - exchange.share)
     left = [direct]
     while True:
         arrived = exchange.carry(left[-1])
@@ -88,23 +88,6 @@ def sky_share(solid: Solid, points: Tensor, normals: Tensor, *, patches: int | N
     if solid.convex:
         return points.new_ones(len(points))
     return (1 - _exchange(solid, patches).share_at(points.cpu(), normals.cpu())).to(points)
-
-
-def direct_irradiance(exchange: Exchange, lights: Sequence[Light]) -> Tensor:
-    """Irradiance of the patches (patch, 1 or channel) by the lights, less what the solid hides from itself."""
-    solid, (points, normals, _) = exchange.solid, exchange.patches
-    total = points.new_zeros(len(points), 1)
-    for light in lights:
-        if isinstance(light, Ambient):
-            radiance = torch.atleast_1d(torch.as_tensor(light.radiance)).to(points)
-            total = total + math.pi * radiance * (1 - exchange.share)[:, None]
-            continue
-        for arrival in light.arrivals(points):
-            cosine = (normals * arrival.direction).sum(-1).clamp(min=0)
-            if solid is not None and shadowless(solid, light) is None:
-                cosine = cosine * unshadowed(solid, points, normals, arrival.direction, distance_to(light, points))
-            total = total + cosine[:, None] * arrival.irradiance
-    return total
 
 
 @lru_cache(maxsize=4)

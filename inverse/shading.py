@@ -7,12 +7,12 @@ import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
+from inverse.arriving import arriving
 from inverse.footprints import Footprints
 from inverse.lights import Ambient, Arrival, Directional, Disc, Environment, Light
 from inverse.plan import Plan
 from inverse.radiosity import bounced, sky_share
 from inverse.scene import Scene
-from inverse.visibility import distance_to, shadowless, unshadowed
 from torchbrdf import BRDF, Cosines, is_per_texel
 
 _AMBIENT_TABLE = 24
@@ -32,13 +32,7 @@ def received(cosines: Cosines, arrival: Arrival) -> Tensor:
 
 def arrivals(light: Directional, where: Footprints) -> Iterator[Arrival]:
     """The directions from which a light reaches the points, with no irradiance where the solid hides it."""
-    for arrival in light.arrivals(where.points):
-        if where.solid is None or shadowless(where.solid, light) is not None:
-            yield arrival
-            continue
-        far = distance_to(light, where.points)
-        clear = unshadowed(where.solid, where.points, where.normals, arrival.direction, far)
-        yield arrival._replace(irradiance=arrival.irradiance * clear[:, None])
+    return arriving(light, where.points, where.normals, where.solid)
 
 
 def extended_reflected(model: BRDF, where: Footprints, light: Disc | Environment) -> Tensor:

@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from inverse.patches import Patches, disc, joined, middles, spiral
+from torchbrdf import any_tangent
 
 # How far a plane takes part in the light between it and what stands on it, in half sizes of that. A wall one half
 # size above the plane loses the strip of it below the horizon: 2/(1000 pi) of its sky.
@@ -159,8 +160,7 @@ class Plane(Body):
         centre = (points.amin(0) + points.amax(0)) / 2
         size = (points - centre).norm(dim=-1).max()
         centre = centre - ((centre - row(self.point, points)) @ normal) * normal
-        across = torch.linalg.cross(normal, torch.eye(3, dtype=torch.float64)[normal.abs().argmin()])
-        across = across / across.norm()
+        across = any_tangent(normal)
         u, v, areas = disc(count, _FAR, core=1.0)
         offsets = u[:, None] * across + v[:, None] * torch.linalg.cross(normal, across)
         return Patches(centre + size * offsets, normal.expand(count, 3), size**2 * areas)

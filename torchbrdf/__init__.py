@@ -18,6 +18,7 @@ from torchbrdf.brdf import (
 )
 from torchbrdf.directions import (
     Cosines,
+    any_tangent,
 )
 from torchbrdf.effects import (
     EFFECTS,
@@ -233,6 +234,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "TorranceSparrow",
     "UnidirectionalVCavities",
     "WeightedSum",
+    "any_tangent",
     "burley",
     "coherency",
     "compact",

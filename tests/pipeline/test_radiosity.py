@@ -7,10 +7,11 @@ import pytest
 import torch
 
 from inverse import Ambient, Cuboid, Cylinder, Distant, Group, Plane, Point, Sphere, vase
+from inverse.arriving import direct_irradiance
 from inverse.exchange import PairExchange, RingExchange, form_factors
 from inverse.geometry import vase_profile
 from inverse.patches import Patches
-from inverse.radiosity import bounced, direct_irradiance, no_interreflection, sky_share
+from inverse.radiosity import bounced, no_interreflection, sky_share
 from inverse.relief import HeightField
 
 D = torch.float64
@@ -250,7 +251,7 @@ def test_colours_dtypes_and_gradients():
 def test_shadows_fall_on_the_patches_too():
     exchange = PairExchange(SCENE, SCENE.patches(400))
     light = Distant(torch.tensor([0.0, 1.0, 0.0], dtype=D))
-    received = direct_irradiance(exchange, [light])[:, 0]
+    received = direct_irradiance([light], *exchange.patches[:2], exchange.solid, 1 - exchange.share)[:, 0]
     points, normals, _ = exchange.patches
     below = (points[:, 1] == 0) & (points[:, [0, 2]].norm(dim=-1) < RADIUS)
     assert below.sum() > 3
