@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
-from torchbrdf.parameters import WEIGHT, Constrained, Parametric
+from torchbrdf.parameters import WEIGHT, Constrained, Parametric, fixed
 from torchbrdf.sampled import Sampled, propose_from_parts
 
 PIXELS_AT_A_TIME = 4096
@@ -184,7 +184,8 @@ class WeightedSum(BRDF):
     """Sum of BRDFs with trainable positive weights (part,). Components are named `Model.part`.
 
     A weight and the albedo of its part say the same thing: hold one of them `fixed` before fitting. The
-    weights of a sum made by + and * are trainable; assign `sum.weights = fixed(...)` to hold them.
+    weights of a sum made by + and * are trainable; `WeightedSum(parts, fixed([...]))` or `sum.weights = fixed(...)`
+    holds them.
     Whether the sum reflects more than it receives is the weights' business: nothing bounds their sum.
     Raises ValueError for a weight that is not positive and finite, or counts that differ; TypeError
     for parts that are not BRDFs.
@@ -192,8 +193,11 @@ class WeightedSum(BRDF):
 
     weights: Constrained = Constrained(WEIGHT)
 
-    def __init__(self, parts: Sequence[BRDF], weights: Sequence[Tensor | float] | Tensor):
+    def __init__(self, parts: Sequence[BRDF], weights: Sequence[Tensor | float] | Tensor | fixed):
         super().__init__()
+        held = isinstance(weights, fixed)
+        if isinstance(weights, fixed):
+            weights = torch.as_tensor(weights.value)
         if not parts or len(parts) != len(weights):
             raise ValueError(
                 f"WeightedSum needs one weight for each of at least one part; found {len(parts)} parts "
@@ -204,7 +208,7 @@ class WeightedSum(BRDF):
                 raise TypeError(f"WeightedSum adds BRDFs; found {type(part).__name__}.")
         self.parts = nn.ModuleList(parts)
         values = [torch.as_tensor(w, dtype=_dtype_of(parts)).detach() for w in weights]
-        self.weights = torch.stack(values)
+        self.weights = fixed(torch.stack(values)) if held else torch.stack(values)
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         found: dict[str, Tensor] = {}

@@ -223,11 +223,8 @@ def _with_part(model: WeightedSum, index: int, part: BRDF) -> WeightedSum:
 
 def _sum_of(model: WeightedSum, parts: list[BRDF], places: list[int]) -> WeightedSum:
     """A sum with the weights a given one has at some places, held fixed if they are there."""
-    weights = kept(model, "weights")
-    total = WeightedSum(parts, model.weights.detach()[places])
-    if isinstance(weights, fixed):
-        total.weights = fixed(model.weights.detach()[places])
-    return total
+    shares = model.weights.detach()[places]
+    return WeightedSum(parts, fixed(shares) if isinstance(kept(model, "weights"), fixed) else shares)
 
 
 def _turned(model: Oriented, inner: BRDF) -> BRDF:

@@ -109,7 +109,7 @@ def test_parts_of_a_sum():
     torch.testing.assert_close(alone(*directions), 0.9 * material(OrenNayar)(*directions))
     torch.testing.assert_close(dropped(*directions), alone(*directions))
     assert set(options(dropped)) == {"rung of part 1"}  # the last part stays
-    model.weights = fixed(number([0.9, 0.2]))
+    model = WeightedSum(list(model.parts), fixed(number([0.9, 0.2])))
     assert not [name for name, _ in options(model)["part 2"][0].model.named_parameters() if "weights" in name]
 
 

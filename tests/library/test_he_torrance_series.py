@@ -14,7 +14,8 @@ from series_inputs import F32, F64, at, bar, scattered, with_slopes
 from torch.testing import assert_close
 
 from torchbrdf.models.he_torrance import series
-from torchbrdf.models.he_torrance.expansion import coefficients, expansion, lambert_w
+from torchbrdf.models.he_torrance.expansion import coefficients, expansion
+from torchbrdf.models.he_torrance.roughness import lambert_w
 from torchbrdf.models.he_torrance.series import first_terms_over_g, series_over_g
 
 DATA = json.loads((Path(__file__).parents[1] / "data" / "he_torrance_series.json").read_text())

@@ -27,10 +27,11 @@ import torch
 from numpy.polynomial import Polynomial
 from torch import Tensor
 
+from torchbrdf.models.he_torrance.roughness import lambert_w
+
 _V = Polynomial([0.0, 1.0])
 # w = 65 at this x: terms beyond m = 30 are then below e^-1900, which is 0 in float64 too.
 _LARGEST_X = 1e30
-_HALLEY_STEPS = 2  # from the starting value, good to 2 %, to 1e-15 relative
 
 
 def expansion(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, degree: int) -> list[Tensor]:
@@ -62,16 +63,6 @@ def expansion(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, degree: in
 def exp_or_zero(x: Tensor) -> Tensor:
     """exp(x) in place of x, and 0 where it would be below the smallest normal number: those are 30 times slower."""
     return torch.threshold_(x, math.log(torch.finfo(x.dtype).tiny), -math.inf).exp_()
-
-
-def lambert_w(x: Tensor) -> Tensor:
-    """W with W e^W = x for x >= 0, (...), to a few rounding errors, for x up to 1e30."""
-    log = torch.log1p(x)
-    w = log * (1 - torch.log1p(log) / (2 + log))
-    for _ in range(_HALLEY_STEPS):
-        excess = w - x * torch.exp(-w)
-        w = w - excess / (1 + w - (w + 2) * excess / (2 * (1 + w)))
-    return w
 
 
 @functools.cache
