@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from inverse import Distant, Scene, Sensor, cross_section, fit, peak_position, render, usable, vase
-from inverse.plots import fit_figure
+from inverse.figures import fit_figure
 from torchbrdf import RoughSurface, fixed, sigma_from_degrees
 from torchbrdf.accuracy import RUNGS
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import torch
 
 from inverse import Distant, Scene, Sensor, bootstrap, fit, read_stack, render, sphere, usable, write_stack
-from inverse.plots import residual_figure
+from inverse.figures import residual_figure
 from torchbrdf import Lambert, OrenNayar, QualitativeOrenNayar, sigma_from_degrees
 
 GRAY_SPHERE = Path("../shared/data/gray_sphere")

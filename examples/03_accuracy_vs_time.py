@@ -20,8 +20,7 @@ import torch
 import torchbrdf
 from inverse import Distant, Scene, Sensor, fit, render, usable, vase
 from torchbrdf import BRDF, Cosines
-from torchbrdf.accuracy import RUNGS, Rung, forward_ratios, ladder, reference
-from torchbrdf.accuracy_series import SeriesLadder, series_ladder
+from torchbrdf.accuracy import RUNGS, Rung, SeriesLadder, forward_ratios, ladder, reference, series_ladder
 from torchbrdf.testing import random_directions
 
 matplotlib.use("Agg")

@@ -15,7 +15,7 @@ from kornia.color import linear_rgb_to_rgb
 from kornia.geometry.camera import PinholeCamera
 from torch import Tensor
 
-from inverse import Cylinder, Environment, Scene, Surface, photographed, pinhole, render
+from inverse import Cylinder, Environment, Scene, Surface, perspective, pinhole, render
 from torchbrdf import ALUMINIUM, HeTorrance, fixed
 
 matplotlib.use("Agg")
@@ -47,7 +47,7 @@ def seen_from_above(size: int) -> Surface:
     c, s = math.cos(DOWNWARD), math.sin(DOWNWARD)
     turn = torch.tensor([[1, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]], dtype=torch.float64)
     above = PinholeCamera(camera.intrinsics, camera.extrinsics @ turn, camera.height.long(), camera.width.long())
-    return photographed(Cylinder(radius=0.6, half_height=0.76), above, samples=3)
+    return perspective(Cylinder(radius=0.6, half_height=0.76), above, samples=3)
 
 
 def edges(surface: Surface) -> Tensor:
@@ -74,7 +74,7 @@ def main() -> None:
     args.output.mkdir(parents=True, exist_ok=True)
     surface = seen_from_above(args.size)
     scene = Scene(surface, [room(args.room)])
-    coarse = Scene(surface, [room(args.room)], detail=edges(surface))
+    coarse = Scene(surface, [room(args.room)], fully_sampled=edges(surface))
     shown = {f"sigma0 {sigma0}, tau {tau:g}": aluminium(sigma0, tau) for sigma0, tau in ROUGHNESS}
     shown["sigma0 0"] = aluminium(0.0, 3.0, directional_diffuse=False)
     shown["uniform diffuse alone"] = aluminium(0.0, 3.0, diffuse=fixed(0.9), specular=False, directional_diffuse=False)

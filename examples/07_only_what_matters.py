@@ -26,7 +26,7 @@ from inverse import (
     cylinder,
     everything,
     orthographic,
-    photographed,
+    perspective,
     pinhole,
     plan,
     plane,
@@ -49,7 +49,7 @@ def three_scenes(size: int) -> dict[str, tuple[Scene, BRDF]]:
     """Scenes that call for different effects, each with its material."""
     up = torch.tensor([0.6, 0.9, 1.0])
     table = Group((Sphere(0.5, (0.0, -0.1, 0.0)), Plane((0.0, 0.9, 0.44), (0.0, -0.6, 0.0))))
-    from_afar = photographed(vase(8, 8).solid, pinhole(size, size, field_of_view=8.0), samples=2)
+    from_afar = perspective(vase(8, 8).solid, pinhole(size, size, field_of_view=8.0), samples=2)
     return {
         "vase of clay, light from 20 degrees": (
             Scene(vase(size, size, samples=2), [Distant.from_angle(20)]),
@@ -68,9 +68,9 @@ def compared(scene: Scene, model: BRDF, planned: Plan) -> tuple[torch.Tensor, to
     full, seconds = everything(scene), ([], [])
     images = []
     with torch.no_grad():
-        for times, work in itertools.product(range(2), ((0, (full, model)), (1, (scene, planned)))):
+        for times, work in itertools.product(range(2), ((0, lambda: render(full, model)), (1, planned.render))):
             began = time.perf_counter()
-            image = render(*work[1])
+            image = work[1]()
             seconds[work[0]].append(time.perf_counter() - began)
             if times == 0:
                 images.append(image)

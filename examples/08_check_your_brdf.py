@@ -1,4 +1,4 @@
-"""Check a BRDF of your own against the laws of `torchbrdf.testing`: two that are broken, and one that is right.
+"""Check a BRDF of your own against the laws of `torchbrdf.testing.laws`: two that are broken, and one that is right.
 
 `FromAngles` is Oren-Nayar as it is often typed in: acos of dot products, and sigma in degrees where the formula wants
 radians. `Varnished` adds an unnormalised highlight divided by the cosine of the light. `Corrected` is what they
@@ -11,7 +11,7 @@ import torch
 
 from torchbrdf import BRDF, Constrained, Interval, QualitativeOrenNayar
 from torchbrdf import testing as laws
-from torchbrdf.sampling_laws import assert_weights
+from torchbrdf.testing import assert_weights
 
 
 class FromAngles(BRDF):

@@ -16,7 +16,7 @@ from torch import Tensor
 
 import torchbrdf as tb
 from inverse import FitResult, Measurements, fit_measurements, read_gonioreflectometer, weighted_reflectance
-from inverse.plots import measurement_figure
+from inverse.figures import measurement_figure
 
 CORNELL = Path("../shared/data/cornell_brdf")
 BANDS = {"blue": (400, 490), "green": (500, 590), "red": (600, 700)}  # [nm]

@@ -4,39 +4,63 @@ The frame is x right, y up, z towards the camera. A scene says what was photogra
 it, its sensor takes the photograph, and `fit` finds the parameters of a BRDF that explain photographs.
 """
 
-from inverse.bootstrap import bootstrap
-from inverse.camera import photographed, pinhole
-from inverse.fit import FitError, fit
-from inverse.geometry import (
+import warnings
+
+from inverse.files import (
+    Measurements,
+    Photographs,
+    read_gonioreflectometer,
+    read_image,
+    read_merl,
+    read_optical_constants,
+    read_stack,
+    usable,
+    write_image,
+    write_stack,
+)
+from inverse.fitting import FitError, FitResult, bootstrap, fit, fit_measurements, weighted_reflectance
+from inverse.planning import Effect, Plan, PlannedFit, everything, plan
+from inverse.profiles import belly_row, cross_section, peak_position
+from inverse.scene import (
+    Ambient,
+    Arrival,
+    Disc,
+    Distant,
+    Environment,
+    Light,
+    Point,
+    Scene,
+    Sensor,
+    SimplerLight,
     Surface,
     cuboid,
     cylinder,
+    from_depth,
+    from_normals,
     orthographic,
+    perspective,
+    pinhole,
     plane,
     revolution,
     side_by_side,
     sphere,
     vase,
 )
-from inverse.lights import Ambient, Disc, Distant, Environment, Point
-from inverse.maps import from_depth, from_normals
-from inverse.measured import Measurements, read_gonioreflectometer, read_merl, read_optical_constants
-from inverse.measured_fit import fit_measurements, weighted_reflectance
-from inverse.photos import Photographs, read_image, read_stack, usable, write_image, write_stack
-from inverse.plan import Effect, Plan
-from inverse.planning import plan
-from inverse.profile import belly_row, cross_section, peak_position
-from inverse.radiometry import exitance, irradiance, solid_angle_of_band, solid_angle_of_cone, solid_angle_of_patch
-from inverse.result import FitResult
-from inverse.scene import Scene
-from inverse.sensor import Sensor
-from inverse.shading import render
-from inverse.simplify import everything
-from inverse.solids import Cuboid, Cylinder, Group, Plane, Solid, Sphere
-from inverse.turned import Revolution
+from inverse.shapes import Absence, Body, Cuboid, Cylinder, Group, Patches, Plane, Revolution, Solid, Sphere
+from inverse.transport import (
+    exitance,
+    irradiance,
+    render,
+    solid_angle_of_band,
+    solid_angle_of_cone,
+    solid_angle_of_patch,
+)
 
 __all__ = [
+    "Absence",
     "Ambient",
+    "Arrival",
+    "Body",
     "Cuboid",
     "Cylinder",
     "Disc",
@@ -46,14 +70,18 @@ __all__ = [
     "FitError",
     "FitResult",
     "Group",
+    "Light",
     "Measurements",
+    "Patches",
     "Photographs",
     "Plan",
     "Plane",
+    "PlannedFit",
     "Point",
     "Revolution",
     "Scene",
     "Sensor",
+    "SimplerLight",
     "Solid",
     "Sphere",
     "Surface",
@@ -71,7 +99,7 @@ __all__ = [
     "irradiance",
     "orthographic",
     "peak_position",
-    "photographed",
+    "perspective",
     "pinhole",
     "plan",
     "plane",
@@ -93,3 +121,13 @@ __all__ = [
     "write_image",
     "write_stack",
 ]
+
+_RENAMED = {"photographed": "perspective"}
+
+
+def __getattr__(name: str) -> object:
+    """Names of version 0.1, for one more version."""
+    if name not in _RENAMED:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn(f"inverse.{name} is now inverse.{_RENAMED[name]}", DeprecationWarning, stacklevel=2)
+    return globals()[_RENAMED[name]]

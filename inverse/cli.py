@@ -11,14 +11,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from inverse.bootstrap import bootstrap
-from inverse.fit import FitError, fit
-from inverse.geometry import cylinder, plane, sphere, vase
-from inverse.lights import Distant
-from inverse.photos import read_stack, usable, write_stack
-from inverse.scene import Scene
-from inverse.sensor import Sensor
-from inverse.shading import render
+from inverse.files import read_stack, usable, write_stack
+from inverse.fitting import FitError, bootstrap, fit
+from inverse.scene import Distant, Scene, Sensor, cylinder, plane, sphere, vase
+from inverse.transport import render
 from torchbrdf import BRDF, Lambert, OrenNayar, QualitativeOrenNayar, fixed
 
 _ROUGH = {"qualitative": QualitativeOrenNayar, "oren-nayar": OrenNayar}
@@ -53,7 +49,7 @@ def _parser() -> argparse.ArgumentParser:
 def _add_fit(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_fit)
     add = parser.add_argument
-    add("folder", help="images, mask, lights.txt and geometry.txt, as `pydoc inverse.photos` describes")
+    add("folder", help="images, mask, lights.txt and geometry.txt, as `pydoc inverse.files.stacks` describes")
     add("--model", choices=["lambert", *_ROUGH], default="oren-nayar")
     add("--albedo", choices=["single", "per-pixel"], default="single")
     add("--geometry", metavar="LINE", help='instead of geometry.txt, such as "sphere 244.5 144.5 108"')

@@ -1,6 +1,8 @@
 """What the packages may import, how long a file may be, and where an epsilon may live."""
 
 import ast
+import importlib
+import inspect
 from pathlib import Path
 
 import pytest
@@ -11,7 +13,9 @@ ROOT = Path(__file__).parents[1]
 LIBRARY = sorted((ROOT / "torchbrdf").rglob("*.py"))
 PIPELINE = sorted((ROOT / "inverse").rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
-LONGEST = 300
+LONGEST = 500
+# Rooms of the pipeline in the order of their imports: each may use those before it.
+ROOMS = ("shapes", "scene", "transport", "files", "fitting", "planning")
 SMALLEST_UNNAMED = 1e-5
 TOLERANCE_ARGUMENTS = {"rtol", "atol", "xtol", "ftol", "gtol", "tol"}
 
@@ -94,6 +98,31 @@ def test_pipeline_imports_public_names_only(path):
         assert module == "torchbrdf", f"{module} is not the public package"
         assert set(names) <= public
     assert uses(path) <= public
+
+
+@pytest.mark.parametrize("path", [p for p in PIPELINE if p.parent.name in ROOMS], ids=named)
+def test_rooms_import_to_the_left_and_through_doors(path):
+    room = path.parent.name
+    for module, _ in imports(path):
+        if module.split(".")[0] != "inverse" or module.startswith(f"inverse.{room}."):
+            continue
+        _, other, *inside = module.split(".")
+        assert not inside, f"{module}: what other rooms may use is in the room's __init__"
+        assert ROOMS.index(other) < ROOMS.index(room)
+        assert not {other, room} >= {"files", "transport"}
+
+
+@pytest.mark.parametrize("package", sorted({p.parent for p in LIBRARY + PIPELINE}), ids=named)
+def test_no_module_is_hidden_by_a_public_name(package):
+    """`import package.name` must give the module, so that nothing the package exports may bear its name."""
+    modules = {p.stem if p.is_file() else p.name for p in package.iterdir() if p.suffix == ".py" or p.is_dir()}
+    door = importlib.import_module(".".join(package.relative_to(ROOT).parts))
+    exported = {name for name in vars(door) if not inspect.ismodule(getattr(door, name))}
+    assert not modules & exported
+
+
+def test_few_files_lie_at_the_top_of_the_pipeline():
+    assert len([p for p in (ROOT / "inverse").glob("*.py") if not p.name.startswith("__")]) <= 5
 
 
 @pytest.mark.parametrize("path", LIBRARY + PIPELINE + TESTS, ids=named)

@@ -10,12 +10,7 @@ Conventions, stated once:
 - Below the horizon f_r is 0 with zero gradient.
 """
 
-from torchbrdf.brdf import (
-    BRDF,
-    ImageBRDF,
-    LinearBRDF,
-    WeightedSum,
-)
+from torchbrdf.brdf import BRDF
 from torchbrdf.directions import (
     Cosines,
     any_tangent,
@@ -26,6 +21,13 @@ from torchbrdf.effects import (
     compact,
     options,
     simulated,
+)
+from torchbrdf.facets import (
+    HalfVector,
+    smith_correlated,
+    smith_separable,
+    v_cavities,
+    v_cavity_masking,
 )
 from torchbrdf.fresnel import (
     Conductor,
@@ -41,13 +43,8 @@ from torchbrdf.fresnel import (
     f0_from_index,
     schlick,
 )
-from torchbrdf.microfacet import (
-    HalfVector,
-    smith_correlated,
-    smith_separable,
-    v_cavities,
-    v_cavity_masking,
-)
+from torchbrdf.linear import ImageBRDF, LinearBRDF
+from torchbrdf.mixture import WeightedSum
 from torchbrdf.models.ashikhmin_shirley import (
     AshikhminShirley,
 )
@@ -55,17 +52,23 @@ from torchbrdf.models.burley import (
     Burley,
     burley,
 )
-from torchbrdf.models.he_torrance.functional import (
-    he_torrance,
-    specular_reflectivity,
+from torchbrdf.models.ggx_and_beckmann import (
+    GGX,
+    AnisotropicBeckmann,
+    AnisotropicGGX,
+    Beckmann,
 )
-from torchbrdf.models.he_torrance.module import (
+from torchbrdf.models.he_torrance.model import (
     HeTorrance,
 )
 from torchbrdf.models.he_torrance.polarised import (
     coherency,
     he_torrance_polarised,
     polarised_specular_reflectivity,
+)
+from torchbrdf.models.he_torrance.reflectance import (
+    he_torrance,
+    specular_reflectivity,
 )
 from torchbrdf.models.lambert import (
     Lambert,
@@ -74,12 +77,6 @@ from torchbrdf.models.layered import (
     Coupled,
     Dampened,
     Mirror,
-)
-from torchbrdf.models.microfacet import (
-    GGX,
-    AnisotropicBeckmann,
-    AnisotropicGGX,
-    Beckmann,
 )
 from torchbrdf.models.minnaert import (
     Minnaert,

@@ -10,11 +10,12 @@ from typing import Any
 
 import torch
 
-from torchbrdf.brdf import BRDF, WeightedSum
+from torchbrdf.brdf import BRDF
 from torchbrdf.fresnel import ConstantFresnel, Fresnel, Perfect
-from torchbrdf.models.he_torrance.module import HeTorrance
+from torchbrdf.mixture import WeightedSum
+from torchbrdf.models.ggx_and_beckmann import GGX, AnisotropicBeckmann, AnisotropicGGX, Beckmann
+from torchbrdf.models.he_torrance.model import HeTorrance
 from torchbrdf.models.lambert import Lambert
-from torchbrdf.models.microfacet import GGX, AnisotropicBeckmann, AnisotropicGGX, Beckmann
 from torchbrdf.models.oren_nayar.anisotropic import AnisotropicRoughSurface
 from torchbrdf.models.oren_nayar.fast import FastRoughSurface
 from torchbrdf.models.oren_nayar.functional import OrenNayar

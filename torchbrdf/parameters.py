@@ -30,6 +30,11 @@ class Interval:
     even: bool = False
     trailing: int = 0
 
+    @property
+    def angular(self) -> bool:
+        """Whether the parameter is an angle: of a material, how steep its facets are."""
+        return self.unit == "rad"
+
     def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
         """Raise ValueError unless every entry lies in the domain (strictly inside if `open_ends`)."""
         if not isinstance(value, Tensor):
@@ -75,6 +80,7 @@ class Simplex:
     unit: ClassVar[str] = ""
     even: ClassVar[bool] = False
     trailing: ClassVar[int] = 1
+    angular: ClassVar[bool] = False
 
     def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
         """Raise ValueError unless the entries are shares (all above 0 if `open_ends`)."""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from torchbrdf.accuracy_series import SCHEMES, SeriesLadder, SeriesRow, series_ladder
+from torchbrdf.accuracy import SCHEMES, SeriesLadder, SeriesRow, series_ladder
 from torchbrdf.models.he_torrance.series import series_over_g
 
 

@@ -10,7 +10,7 @@ from torch.testing import assert_close
 
 from torchbrdf import HeTorrance, fixed, sampling_laws
 from torchbrdf.models.he_torrance.energy import lobe_albedo
-from torchbrdf.models.he_torrance.functional import specular_reflectivity
+from torchbrdf.models.he_torrance.reflectance import specular_reflectivity
 from torchbrdf.models.he_torrance.spike import cone_overlap
 
 PERFECT = 1e4j  # |F| = 1 at every angle

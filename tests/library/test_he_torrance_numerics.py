@@ -8,7 +8,7 @@ from test_he_torrance import doubles, material
 from torch.testing import assert_close
 
 from torchbrdf import Cosines, HeTorrance, fixed, he_torrance, specular_reflectivity
-from torchbrdf.models.he_torrance.functional import directional_diffuse, mirror_reflectance
+from torchbrdf.models.he_torrance.reflectance import directional_diffuse, mirror_reflectance
 from torchbrdf.models.he_torrance.spike import averaged_spike
 from torchbrdf.testing import hard_directions, random_directions
 

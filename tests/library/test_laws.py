@@ -1,4 +1,4 @@
-"""The laws of `torchbrdf.testing` over the catalog."""
+"""The laws of `torchbrdf.testing.laws` over the catalog."""
 
 import pytest
 import torch

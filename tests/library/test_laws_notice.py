@@ -1,4 +1,4 @@
-"""Each law of `torchbrdf.testing` notices a model that breaks it, and its directions are what they are called."""
+"""Each law of `torchbrdf.testing.laws` notices a model that breaks it, and its directions are what they are called."""
 
 import math
 

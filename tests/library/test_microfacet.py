@@ -9,7 +9,7 @@ from scipy.special import wofz
 from torch.testing import assert_close
 
 from torchbrdf import Cosines, HalfVector, v_cavity_masking
-from torchbrdf.microfacet import (
+from torchbrdf.facets import (
     anisotropic_beckmann_distribution,
     anisotropic_ggx_distribution,
     beckmann_distribution,

@@ -19,7 +19,7 @@ from inverse import (
     cylinder,
     fit,
     orthographic,
-    photographed,
+    perspective,
     pinhole,
     render,
     sphere,
@@ -134,7 +134,7 @@ def test_plane_is_hit_from_above_only():
 @pytest.mark.parametrize("make", [sphere, cylinder, vase, cuboid])
 def test_a_telephoto_camera_sees_the_orthographic_image(make):
     flat = make(24, 20, dtype=D)
-    far = photographed(flat.solid, pinhole(24, 20, field_of_view=0.01), dtype=D)
+    far = perspective(flat.solid, pinhole(24, 20, field_of_view=0.01), dtype=D)
     both = flat.mask & far.mask
     assert (flat.mask != far.mask).sum() <= 2
     assert (flat.normals - far.normals)[both].norm(dim=-1).median() < 1e-3
@@ -145,7 +145,7 @@ def test_a_telephoto_camera_sees_the_orthographic_image(make):
 def test_points_project_onto_their_pixels(samples):
     """kornia's own projection of what each pixel shows gives that pixel back."""
     camera = pinhole(18, 14, field_of_view=50)
-    surface = photographed(Sphere(0.8), camera, samples=samples, dtype=D)
+    surface = perspective(Sphere(0.8), camera, samples=samples, dtype=D)
     projected = camera.project(surface.points[surface.mask])
     rows, columns = surface.mask.nonzero().unbind(-1)
     wanted = (torch.stack((columns, rows), -1).to(D) + 0.5) / samples - 0.5
@@ -157,7 +157,7 @@ def test_points_project_onto_their_pixels(samples):
 
 def test_perspective_shows_less_of_a_sphere():
     """From a distance d a sphere of radius r shows the cap within acos(r/d) and the silhouette asin(r/d)."""
-    surface = photographed(Sphere(0.5), pinhole(200, 200, field_of_view=60, distance=2.0), dtype=D)
+    surface = perspective(Sphere(0.5), pinhole(200, 200, field_of_view=60, distance=2.0), dtype=D)
     cap = surface.points[surface.mask][:, 2].min().item()
     assert 0.125 < cap < 0.125 + 0.04  # the edge of the cap lies between two pixels
     half_width = surface.mask.any(0).sum().item() / 200 * math.tan(math.radians(30))
@@ -174,7 +174,7 @@ def test_orthographic_group_shows_the_nearer_solid():
 
 
 def test_fit_through_a_pinhole():
-    surface = photographed(vase(8, 8).solid, pinhole(40, 40, field_of_view=40), dtype=D)
+    surface = perspective(vase(8, 8).solid, pinhole(40, 40, field_of_view=40), dtype=D)
     scene = Scene(surface, [Distant.from_angle(0), Distant.from_angle(30)])
     truth = OrenNayar(albedo=torch.tensor(0.7, dtype=D), sigma=torch.tensor(0.6, dtype=D))
     result = fit(scene, render(scene, truth).detach(), OrenNayar(albedo=0.4, sigma=0.3))
@@ -187,7 +187,7 @@ def test_fit_through_a_pinhole():
         (lambda: pinhole(4, 4, field_of_view=180), r"field_of_view must lie in \(0, 180\) degrees; found 180"),
         (lambda: pinhole(0, 4), "height and width must be whole numbers of at least 1; found 0 and 4"),
         (lambda: pinhole(4, 4, distance=-1.0), "distance must be positive and finite"),
-        (lambda: photographed(Sphere(0.5, (5.0, 0, 0)), pinhole(4, 4)), "mask is empty"),
+        (lambda: perspective(Sphere(0.5, (5.0, 0, 0)), pinhole(4, 4)), "mask is empty"),
         (lambda: Sphere(-1.0), r"Sphere\.radius must be positive and finite; found -1"),
         (lambda: Cylinder(1.0, 0.0), r"Cylinder\.radius and half_height"),
         (lambda: Cuboid((1.0, 0.0, 1.0)), r"Cuboid\.half_sizes must be positive"),

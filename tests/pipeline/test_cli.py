@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from inverse.cli import main
-from inverse.photos import read_image, read_stack
+from inverse.files.stacks import read_image, read_stack
 
 
 def refuse(text):

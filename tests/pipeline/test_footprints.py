@@ -20,10 +20,10 @@ from inverse import (
     sphere,
     vase,
 )  # fmt: skip
-from inverse.footprints import footprints
-from inverse.prediction import predictor
-from inverse.radiosity import bounced, sky_share
-from inverse.visibility import unshadowed
+from inverse.fitting.prediction import predictor
+from inverse.scene.footprints import Footprints
+from inverse.transport.radiosity import bounced, sky_share
+from inverse.transport.shadows import unshadowed
 from torchbrdf import EON, Coupled, Lambert, OrenNayar
 
 D = torch.float64
@@ -38,7 +38,7 @@ def number(value):
 def test_shares_of_a_pixel_are_its_coverage(samples):
     surface = vase(20, 16, samples=samples, dtype=D)
     for detail in (None, torch.zeros(20, 16, dtype=torch.bool), torch.rand(20, 16) < 0.5):
-        where = footprints(surface, detail)
+        where = Footprints.of(surface, detail)
         found = where.to_image(torch.ones(len(where.points), 1, dtype=D))[..., 0]
         torch.testing.assert_close(found, surface.coverage())
         torch.testing.assert_close(where.normals.norm(dim=-1), torch.ones(len(where.points), dtype=D))
@@ -50,7 +50,7 @@ def test_one_point_a_pixel_errs_with_the_square_of_the_pixel():
     for size in (32, 64, 128):
         surface = sphere(size, size, samples=2, dtype=D)
         scene = Scene(surface, [light])
-        merged = replace(scene, detail=torch.zeros(size, size, dtype=torch.bool))
+        merged = replace(scene, fully_sampled=torch.zeros(size, size, dtype=torch.bool))
         inner = surface.normals[..., 2].unflatten(0, (size, 2)).unflatten(2, (size, 2)).amin((1, 3)) > 0.6
         difference = (render(scene, model) - render(merged, model))[0, ..., 0].abs()
         # in the mean: on the few pixels that a kink of the model crosses the error falls more slowly
@@ -109,7 +109,7 @@ def test_a_fit_predicts_what_is_rendered(name, samples, psf):
         [Disc(torch.tensor([0.5, 0.5, 1.0]), 0.1), Point(torch.tensor([1.0, 2, 3]), 4.0)],
     ]
     sensor = Sensor(exposure=1.7, psf_sigma=psf)
-    scene = Scene(surface, lights, sensor, between_parts=True, detail=torch.rand(24, 24) < 0.5)
+    scene = Scene(surface, lights, sensor, between_parts=True, fully_sampled=torch.rand(24, 24) < 0.5)
     pixels = surface.coverage() == 1
     predicted = predictor(scene, model, pixels, per_texel=False)(dict(model.named_parameters()))
     recorded = sensor.focus(render(scene, model)) * sensor.exposure

@@ -5,7 +5,8 @@ import math
 import pytest
 import torch
 
-from inverse.geometry import (
+from inverse.scene.maps import from_depth, from_normals
+from inverse.scene.surface import (
     Surface,
     cylinder,
     pixel_average,
@@ -16,7 +17,6 @@ from inverse.geometry import (
     vase,
     vase_profile,
 )
-from inverse.maps import from_depth, from_normals
 
 D = torch.float64
 SURFACES = {

@@ -25,13 +25,17 @@ from inverse import (
     solid_angle_of_patch,
     sphere,
 )  # fmt: skip
-from inverse.footprints import footprints
-from inverse.shading import arrivals, radiance
+from inverse.scene.footprints import Footprints
+from inverse.transport.rendering import radiance_of
 from torchbrdf import Coupled, Lambert, Mirror, ModifiedPhong, OrenNayar, RoughSurface, Schlick
 
 D = torch.float64
 GOLDEN = json.loads((Path(__file__).parents[1] / "data" / "other_models.json").read_text())["radiometry"]
 UP = torch.tensor([0.0, 0.0, 1.0], dtype=D)
+
+
+def first_arrival(light, surface):
+    return next(light.arrivals(surface.points[surface.mask]))
 
 
 def vector(*values):
@@ -67,16 +71,16 @@ def test_cone_of_light(spot):
     radiant = GOLDEN["eq31 cone half-angle 0.4 L=2 lambert rho=.6"]
     light = Disc(UP, 0.4, 2 * math.pi * math.sin(0.4) ** 2)
     assert light.radiance.item() == pytest.approx(2, rel=1e-14)
-    assert radiance(lambert(0.6), footprints(spot), (light,)).item() == pytest.approx(radiant, rel=1e-13)
+    assert radiance_of(Footprints.of(spot), (light,))(lambert(0.6)).item() == pytest.approx(radiant, rel=1e-13)
     tilted = plane(1, 1, normal=(math.sin(0.5), 0, math.cos(0.5)), dtype=D)
     assert irradiance(tilted, (light,)).item() == pytest.approx(float(light.irradiance) * math.cos(0.5), rel=1e-13)
 
 
 def test_uniform_light(spot):
     wanted = GOLDEN["eq31 uniform L=2 lambert rho=.6"]
-    assert radiance(lambert(0.6), footprints(spot), (Ambient(2.0),)).item() == pytest.approx(wanted, rel=1e-6)
+    assert radiance_of(Footprints.of(spot), (Ambient(2.0),))(lambert(0.6)).item() == pytest.approx(wanted, rel=1e-6)
     everywhere = Environment(torch.full((64, 128, 1), 2.0, dtype=D))
-    assert radiance(lambert(0.6), footprints(spot), (everywhere,)).item() == pytest.approx(wanted, rel=2e-3)
+    assert radiance_of(Footprints.of(spot), (everywhere,))(lambert(0.6)).item() == pytest.approx(wanted, rel=2e-3)
     assert irradiance(spot, (Ambient(2.0),)).item() == pytest.approx(2 * math.pi)
 
 
@@ -99,7 +103,7 @@ def test_lights_of_an_image_add(spot):
         direction = place / r2.sqrt()
         wanted += model(UP, direction, UP) * strength * direction[2].clamp(min=0) / r2
     lights = tuple(Point(place, strength) for place, strength in zip(places, strengths, strict=True))
-    torch.testing.assert_close(radiance(model, footprints(spot), lights)[0], wanted, rtol=1e-13, atol=0)
+    torch.testing.assert_close(radiance_of(Footprints.of(spot), lights)(model)[0], wanted, rtol=1e-13, atol=0)
 
 
 def test_a_far_point_is_a_distant_light():
@@ -123,7 +127,9 @@ def test_disc_is_the_integral_over_its_cone():
         normal = surface.normals[0, 0]
         values = rough()(normal, directions, UP) * (directions @ normal).clamp(min=0)[..., None]
         wanted = (values * inside[..., None]).sum((0, 1)) * light.radiance * (2 * math.pi / 320000)
-        torch.testing.assert_close(radiance(rough(), footprints(surface), (light,))[0], wanted, rtol=tolerance, atol=0)
+        torch.testing.assert_close(
+            radiance_of(Footprints.of(surface), (light,))(rough())[0], wanted, rtol=tolerance, atol=0
+        )
 
 
 def test_environment_directions():
@@ -174,9 +180,9 @@ def test_polished_body_shows_body_and_mirror(spot):
     """Under a uniform map the layered model returns mirror and body together: F + rho (1 - F)."""
     model = Coupled(albedo=number(0.5), fresnel=Schlick(f0=number(0.1)))
     white = Environment(torch.ones(64, 128, 1, dtype=D))
-    assert radiance(model, footprints(spot), (white,)).item() == pytest.approx(0.1 + 0.5 * 0.9, rel=2e-3)
+    assert radiance_of(Footprints.of(spot), (white,))(model).item() == pytest.approx(0.1 + 0.5 * 0.9, rel=2e-3)
     disc = Disc(UP, 0.1, 1.0)
-    lobe = radiance(Mirror(), footprints(spot), (disc,)).item()
+    lobe = radiance_of(Footprints.of(spot), (disc,))(Mirror()).item()
     assert lobe == pytest.approx(disc.radiance.item(), rel=1e-12)
 
 
@@ -194,7 +200,7 @@ def test_exitance_is_albedo_times_irradiance():
 
 
 def arrive(surface, lamp):
-    return next(arrivals(Point(lamp), footprints(surface)))
+    return first_arrival(Point(lamp), surface)
 
 
 @pytest.mark.parametrize("make", [OrenNayar, lambda **k: RoughSurface(**k, nodes=4)])
@@ -218,11 +224,11 @@ def test_fit_under_a_lamp_and_a_disc(make):
         (lambda: Environment(-torch.ones(3, 4, 1)), r"Environment\.radiance must be finite and not negative"),
         (lambda: Environment(torch.ones(6, 4, 1)).reduced(4), "rows must divide the map's 6 rows; found 4"),
         (
-            lambda: next(arrivals(Point(UP), footprints(from_normals(UP.expand(2, 2, 3))))),
+            lambda: first_arrival(Point(UP), from_normals(UP.expand(2, 2, 3))),
             "known positions away from the lamp",
         ),
         (
-            lambda: next(arrivals(Point(0 * UP), footprints(plane(1, 1, dtype=D)))),
+            lambda: first_arrival(Point(0 * UP), plane(1, 1, dtype=D)),
             "surface point at the lamp's position",
         ),
     ],

@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from inverse.measured import read_gonioreflectometer, read_merl, read_optical_constants
+from inverse.files.reflectance import read_gonioreflectometer, read_merl, read_optical_constants
 from torchbrdf.testing import random_directions
 
 ANGLES = "# num wls\n2\n# wls\n450 650\n\n# theta i\n0.5 0.0 1.0 3.0 0.25 0.5\n0.0 0.0 0.2 0.1 0.125 1.0  # last\n"

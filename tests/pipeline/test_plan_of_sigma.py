@@ -25,7 +25,7 @@ def test_plan_of_sigma_keeps_the_answer(sigma):
     truth = clay(0.7, sigma)
     found = plan(scene, truth, 1.0, of="sigma")
     photographs = SENSOR.exposure * render(everything(scene), truth).detach()
-    result = fit(scene, photographs, plan=found)
+    result = found.fit(photographs)
     assert result.plan is found
     noisy = SENSOR.expose(render(everything(scene), truth), torch.Generator().manual_seed(0)).detach()
     error = fit(scene, noisy, clay(0.6, sigma)).standard_error["sigma"]

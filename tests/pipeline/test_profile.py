@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from inverse import Distant, Scene, belly_row, cross_section, peak_position, render, sphere, vase
-from inverse.geometry import vase_profile
+from inverse.scene.surface import vase_profile
 from torchbrdf import Lambert
 
 DOUBLE = torch.float64

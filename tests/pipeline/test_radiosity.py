@@ -7,12 +7,12 @@ import pytest
 import torch
 
 from inverse import Ambient, Cuboid, Cylinder, Distant, Group, Plane, Point, Sphere, vase
-from inverse.arriving import direct_irradiance
-from inverse.exchange import PairExchange, RingExchange, form_factors
-from inverse.geometry import vase_profile
-from inverse.patches import Patches
-from inverse.radiosity import bounced, no_interreflection, sky_share
-from inverse.relief import HeightField
+from inverse.scene.surface import vase_profile
+from inverse.shapes.form_factors import PairExchange, RingExchange, form_factors
+from inverse.shapes.height_field import HeightField
+from inverse.shapes.patches import Patches
+from inverse.transport.direct import direct_irradiance
+from inverse.transport.radiosity import bounced, sky_share, why_no_interreflection
 
 D = torch.float64
 
@@ -158,7 +158,7 @@ def test_white_objects_are_invisible_in_uniform_light():
 
 def test_rings_carry_as_every_pair_does():
     solid = vase(8, 8).solid
-    rings = RingExchange(solid, 20)
+    rings = RingExchange(solid, solid.wall(20), 20, solid.on_end)
     pairs = PairExchange(solid, rings.patches)
     exitance = torch.rand(2, 400, 3, generator=torch.Generator().manual_seed(0), dtype=D)
     torch.testing.assert_close(rings.carry(exitance), pairs.carry(exitance))
@@ -191,7 +191,7 @@ def test_patches_have_the_surface_of_their_solid():
 def test_a_plane_takes_part_far_out():
     """In a disc of 1000 half sizes under the middle of what stands on it."""
     above = Sphere(0.5).patches(2000).points
-    points, normals, areas = Plane((0.0, 0.6, 0.8), (0.0, 1.0, 0.0)).patches_below(above, 300)
+    points, normals, areas = Plane((0.0, 0.6, 0.8), (0.0, 1.0, 0.0)).patches_near(above, 300)
     assert areas.sum().item() == pytest.approx(math.pi * 500**2, rel=0.01)
     assert ((points - torch.tensor([0.0, 1.0, 0.0], dtype=D)) @ normals[0]).abs().max() < 1e-9
     middle = 0.6 * normals[0]  # the plane's point nearest to the sphere's centre
@@ -206,9 +206,9 @@ def test_convex_solids_take_no_work():
     points, normals = ball([0.1])
     assert torch.equal(bounced(Sphere(), [Ambient()], points, normals), torch.zeros(1, 1, 1, dtype=D))
     assert torch.equal(sky_share(Sphere(), points.float(), normals.float()), torch.ones(1))
-    assert "convex" in (no_interreflection(Sphere()) or "")
-    assert "unknown" in (no_interreflection(None) or "")
-    assert no_interreflection(vase(8, 8).solid) is None
+    assert "convex" in why_no_interreflection(Sphere()).reason
+    assert "unknown" in why_no_interreflection(None).reason
+    assert why_no_interreflection(vase(8, 8).solid) is None
 
 
 def test_bounces_left_out_stay_below_the_tolerance():
@@ -251,7 +251,7 @@ def test_colours_dtypes_and_gradients():
 def test_shadows_fall_on_the_patches_too():
     exchange = PairExchange(SCENE, SCENE.patches(400))
     light = Distant(torch.tensor([0.0, 1.0, 0.0], dtype=D))
-    received = direct_irradiance([light], *exchange.patches[:2], exchange.solid, 1 - exchange.share)[:, 0]
+    received = direct_irradiance([light], *exchange.patches[:2], SCENE, 1 - exchange.share)[:, 0]
     points, normals, _ = exchange.patches
     below = (points[:, 1] == 0) & (points[:, [0, 2]].norm(dim=-1) < RADIUS)
     assert below.sum() > 3

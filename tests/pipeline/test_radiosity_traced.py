@@ -8,8 +8,8 @@ import pytest
 import torch
 
 from inverse import Distant, vase
-from inverse.geometry import vase_profile
-from inverse.radiosity import bounced
+from inverse.scene.surface import vase_profile
+from inverse.transport.radiosity import bounced
 
 
 class Tracer:

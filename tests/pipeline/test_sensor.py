@@ -5,7 +5,7 @@ import math
 import pytest
 import torch
 
-from inverse.sensor import Sensor
+from inverse.scene.sensor import Sensor
 
 D = torch.float64
 

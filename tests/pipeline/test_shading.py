@@ -6,12 +6,12 @@ from itertools import pairwise
 import pytest
 import torch
 
-from inverse.footprints import footprints
-from inverse.geometry import cylinder, plane, sphere
-from inverse.lights import Ambient, Distant
-from inverse.maps import from_depth
-from inverse.scene import Scene
-from inverse.shading import arrivals, cosines_to, radiance, render
+from inverse.scene.footprints import Footprints
+from inverse.scene.lights import Ambient, Distant
+from inverse.scene.maps import from_depth
+from inverse.scene.scene import Scene
+from inverse.scene.surface import cylinder, plane, sphere
+from inverse.transport.rendering import cosines_to, radiance_of, render
 from torchbrdf import Lambert, OrenNayar, QualitativeOrenNayar
 
 D = torch.float64
@@ -110,7 +110,7 @@ def test_ambient_is_the_integral_over_the_hemisphere(model, tolerance):
     """Midpoint rule over the whole sphere of light directions, 200 x 400, in the camera's frame."""
     surface = sphere(15, 15, dtype=D)
     keep = surface.normals[surface.mask][:, 2] > math.cos(math.radians(85))
-    found = radiance(model, footprints(surface), (Ambient(0.7),))[keep]
+    found = radiance_of(Footprints.of(surface), (Ambient(0.7),))(model)[keep]
     z = (torch.arange(200, dtype=D) + 0.5) / 100 - 1
     azimuth = (torch.arange(400, dtype=D) + 0.5) * (2 * math.pi / 400)
     sine = (1 - z * z).sqrt()[:, None]
@@ -141,7 +141,7 @@ def test_supersampled_rim_is_partly_covered():
     """A disk of radiance 1: each pixel is its covered share."""
     surface = sphere(12, 12, radius=0.9, samples=4, dtype=D)
     values = torch.ones(int(surface.mask.sum()), 1, dtype=D)
-    torch.testing.assert_close(footprints(surface).to_image(values)[..., 0], surface.coverage())
+    torch.testing.assert_close(Footprints.of(surface).to_image(values)[..., 0], surface.coverage())
 
 
 def test_perspective_view_directions_are_used():
@@ -202,7 +202,7 @@ def test_angles_count_to_the_right_of_the_camera():
 
 def test_cosines_come_from_the_masked_points():
     surface = sphere(9, 9, dtype=D)
-    cosines = cosines_to(next(arrivals(Distant.from_angle(0), footprints(surface))), footprints(surface))
+    cosines = cosines_to(next(Distant.from_angle(0).arrivals(surface.points[surface.mask])), Footprints.of(surface))
     torch.testing.assert_close(cosines.light, surface.normals[surface.mask][:, 2])
     torch.testing.assert_close(cosines.view, cosines.light)
     torch.testing.assert_close(cosines.phase, torch.ones_like(cosines.light))

@@ -8,10 +8,10 @@ import torch
 from PIL import Image
 from png_files import png_bytes
 
-from inverse.geometry import sphere, vase
-from inverse.lights import Ambient, Distant
-from inverse.photos import read_stack, usable, write_stack
-from inverse.scene import Scene
+from inverse.files.stacks import read_stack, usable, write_stack
+from inverse.scene.lights import Ambient, Distant
+from inverse.scene.scene import Scene
+from inverse.scene.surface import sphere, vase
 
 GRAY_SPHERE = Path(__file__).parents[3] / "shared" / "data" / "gray_sphere"
 

@@ -7,10 +7,10 @@ import pytest
 import torch
 
 from inverse import Ambient, Disc, Distant, Group, Plane, Point, Revolution, Sphere, cuboid, cylinder, sphere, vase
-from inverse.geometry import vase_profile
-from inverse.maps import from_depth
-from inverse.relief import HeightField
-from inverse.visibility import distance_to, shadowless, unshadowed
+from inverse.scene.maps import from_depth
+from inverse.scene.surface import vase_profile
+from inverse.shapes.height_field import HeightField
+from inverse.transport.shadows import unshadowed
 
 D = torch.float64
 
@@ -43,13 +43,13 @@ def marched(points, normals, direction, steps=1500):
 def test_reasons_for_no_shadow():
     solid = vase(8, 8).solid
     level, raised = Distant.from_angle(20), Distant(towards(20, 40))
-    assert "convex" in (shadowless(Sphere(), raised) or "")
-    assert "disc" in (shadowless(solid, level) or "")
-    assert "unknown" in (shadowless(None, raised) or "")
-    assert "sky_share" in (shadowless(solid, Ambient()) or "")
+    assert "convex" in raised.why_shadowless(Sphere()).reason
+    assert "disc" in level.why_shadowless(solid).reason
+    assert "unknown" in raised.why_shadowless(None).reason
+    assert "sky_share" in Ambient().why_shadowless(solid).reason
     for light in (raised, Point(torch.tensor([2.0, 0, 2])), Disc(towards(20, 0), 0.1)):
-        assert shadowless(solid, light) is None
-    assert shadowless(Group((Sphere(), Plane(point=(0, 0, -2)))), level) is None
+        assert light.why_shadowless(solid) is None
+    assert level.why_shadowless(Group((Sphere(), Plane(point=(0, 0, -2))))) is None
 
 
 # --- the vase ----------------------------------------------------------------------------------------------
@@ -159,7 +159,7 @@ def test_shadow_of_a_lamp_is_a_cone():
         arrival = next(lamp.arrivals(points))
         cosine = -(arrival.direction @ to_centre) / to_centre.norm()
         edge = math.sqrt(1 - (RADIUS / to_centre.norm().item()) ** 2)
-        clear = unshadowed(SCENE, points, normals, arrival.direction, distance_to(lamp, points))
+        clear = unshadowed(SCENE, points, normals, arrival.direction, lamp.distance(points))
         sure = (cosine - edge).abs() > 1e-5
         assert torch.equal(clear[sure], cosine[sure] < edge)
         assert not clear.all()
@@ -169,9 +169,9 @@ def test_lamp_in_front_of_the_occluder_casts_no_shadow():
     points, normals = floor()
     lamp = Point(torch.tensor([0.02, 0.1, 0.0], dtype=D))  # between the sphere and the floor
     arrival = next(lamp.arrivals(points))
-    assert unshadowed(SCENE, points, normals, arrival.direction, distance_to(lamp, points)).all()
+    assert unshadowed(SCENE, points, normals, arrival.direction, lamp.distance(points)).all()
     assert not unshadowed(SCENE, points, normals, arrival.direction).all()
-    assert distance_to(Distant.from_angle(0), points) is None
+    assert Distant.from_angle(0).distance(points) is None
 
 
 # --- depth maps --------------------------------------------------------------------------------------------

@@ -9,8 +9,8 @@ from torch import Tensor
 from torchbrdf._numerics import log_cosine_over_sine_squared, safe_sqrt
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
+from torchbrdf.facets import HalfVector
 from torchbrdf.fresnel import fifth_power, schlick
-from torchbrdf.microfacet import HalfVector
 from torchbrdf.parameters import ALBEDO, EXPONENT, Constrained, fixed
 from torchbrdf.sampling import choose, cosine_hemisphere, mirrored
 

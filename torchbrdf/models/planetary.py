@@ -7,8 +7,9 @@ import torch
 from torch import Tensor
 
 from torchbrdf._numerics import angle, safe_divide, safe_power, safe_sqrt, sine_excess
-from torchbrdf.brdf import BRDF, LinearBRDF
+from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
+from torchbrdf.linear import LinearBRDF
 from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
 
 ASYMMETRY = Interval(-1.0, 1.0)

@@ -7,8 +7,8 @@ import torch
 from torch import Tensor
 
 from torchbrdf._numerics import angle_over_sine, safe_sqrt
-from torchbrdf.brdf import LinearBRDF
 from torchbrdf.directions import Cosines
+from torchbrdf.linear import LinearBRDF
 from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
 from torchbrdf.sampling import CltcSampled
 

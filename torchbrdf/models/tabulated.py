@@ -9,7 +9,7 @@ from torch import Tensor
 from torchbrdf._numerics import angle, dot, safe_divide, safe_sqrt
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.microfacet import HalfVector
+from torchbrdf.facets import HalfVector
 
 
 def rusinkiewicz_angles(cosines: Cosines) -> tuple[Tensor, Tensor, Tensor]:

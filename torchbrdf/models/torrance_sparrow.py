@@ -7,8 +7,7 @@ from torch import Tensor
 
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.fresnel import Fresnel, Perfect
-from torchbrdf.microfacet import (
+from torchbrdf.facets import (
     HalfVector,
     slope_area,
     slope_area_angle,
@@ -17,6 +16,7 @@ from torchbrdf.microfacet import (
     v_cavity_masking,
     visible_azimuth,
 )
+from torchbrdf.fresnel import Fresnel, Perfect
 from torchbrdf.parameters import ROUGHNESS, Constrained, fixed
 from torchbrdf.sampling import along_view, mirrored
 

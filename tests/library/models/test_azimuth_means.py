@@ -10,7 +10,6 @@ import pytest
 import torch
 from scipy.integrate import quad
 
-from torchbrdf.attenuation import direct_integrand, geometric_attenuation
 from torchbrdf.models.oren_nayar.azimuth import (
     direct_mean,
     saturated_correlation,
@@ -25,6 +24,7 @@ from torchbrdf.models.oren_nayar.interreflection import (
     two_bounce_integrand,
 )
 from torchbrdf.models.oren_nayar.slope_plane import slope_plane_from_angles
+from torchbrdf.v_cavity import direct_integrand, geometric_attenuation
 
 RNG = np.random.default_rng(5)
 CASES = [(*RNG.uniform(0, 1.5, 2), RNG.uniform(0, math.pi), RNG.uniform(0.05, 1.5)) for _ in range(25)]

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import torch
 
-from torchbrdf.attenuation import strip_fraction
 from torchbrdf.models.oren_nayar.cavity_modes import bounce_coefficients, facet_modes, modes_of
 from torchbrdf.models.oren_nayar.images import Bounces, cavity_images
 from torchbrdf.models.oren_nayar.interreflection import two_bounce_factor
 from torchbrdf.quadrature import gauss_legendre
+from torchbrdf.v_cavity import strip_fraction
 
 F64 = torch.float64
 CPU = torch.device("cpu")

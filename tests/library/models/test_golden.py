@@ -207,7 +207,7 @@ def test_fresnel(name):
 
 
 def test_constants():
-    from torchbrdf.microfacet import slope_area_norm
+    from torchbrdf.facets import slope_area_norm
 
     table = GOLDEN["constants"]
     for sigma, value in table["slope_area_norm"].items():

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from torchbrdf._numerics import cross, dot, safe_sqrt
 from torchbrdf.directions import Cosines
-from torchbrdf.microfacet import HalfVector
+from torchbrdf.facets import HalfVector
 from torchbrdf.models.he_torrance.roughness import effective_roughness
 from torchbrdf.models.he_torrance.series import series_over_g
 from torchbrdf.models.he_torrance.shadowing import shadowing

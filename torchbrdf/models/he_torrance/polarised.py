@@ -20,8 +20,8 @@ from torch import Tensor
 from torchbrdf._numerics import cross, dot, horizon, safe_sqrt
 from torchbrdf.directions import Cosines, any_tangent, orthonormal_tangent
 from torchbrdf.fresnel import conductor_amplitudes, refracted_cosine
-from torchbrdf.models.he_torrance.functional import check_surface
 from torchbrdf.models.he_torrance.lobe import Geometry, coherent, diffracted
+from torchbrdf.models.he_torrance.reflectance import check_surface
 
 
 def unpolarised(like: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf.directions import Cosines
-from torchbrdf.microfacet import (
+from torchbrdf.facets import (
     HalfVector,
     beckmann_distribution,
     beckmann_lambda,
@@ -19,10 +19,9 @@ from torchbrdf.microfacet import (
     ggx_lambda,
     tangent_squared,
 )
-from torchbrdf.microfacet_sampling import visible_beckmann_facet, visible_ggx_facet
 from torchbrdf.models.he_torrance.lobe import Geometry
 from torchbrdf.parameters import NARROWEST
-from torchbrdf.sampling import choose, mirrored, towards
+from torchbrdf.sampling import choose, mirrored, towards, visible_beckmann_facet, visible_ggx_facet
 
 
 def facet_width(cos: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:

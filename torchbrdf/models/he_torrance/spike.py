@@ -19,8 +19,8 @@ from torch import Tensor
 
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
-from torchbrdf.models.he_torrance.functional import mirror_reflectance
 from torchbrdf.models.he_torrance.lobe import Geometry
+from torchbrdf.models.he_torrance.reflectance import mirror_reflectance
 from torchbrdf.quadrature import gauss_legendre
 
 # Solid angles of cones: from one that float32 cannot tell from a delta lobe to a quarter of the hemisphere. [sr]

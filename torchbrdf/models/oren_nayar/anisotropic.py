@@ -6,8 +6,8 @@ from typing import Literal, final
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import ImageBRDF
 from torchbrdf.directions import Cosines
+from torchbrdf.linear import ImageBRDF
 from torchbrdf.models.oren_nayar.images import Bounces, cavity_images, flat_coefficients
 from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
 from torchbrdf.quadrature import gauss_legendre

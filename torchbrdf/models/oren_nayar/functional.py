@@ -6,8 +6,8 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import LinearBRDF
 from torchbrdf.directions import Cosines
+from torchbrdf.linear import LinearBRDF
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 

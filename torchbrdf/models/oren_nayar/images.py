@@ -14,12 +14,12 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from torchbrdf.attenuation import direct_facet
 from torchbrdf.models.oren_nayar.azimuth import common_excess, direct_from, saturated_correlation, saturated_lobes
 from torchbrdf.models.oren_nayar.azimuth_quadrature import higher_bounce_means, two_bounce_mean
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, bounce_coefficients, facet_modes
 from torchbrdf.models.oren_nayar.interreflection import two_bounce_facet
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane
+from torchbrdf.v_cavity import direct_facet
 
 # With more, the quadrature and the fit behind the modes lose their digits.
 MOST_MODES = 20

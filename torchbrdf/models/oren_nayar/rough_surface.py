@@ -6,8 +6,8 @@ from typing import Literal, final
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import ImageBRDF
 from torchbrdf.directions import Cosines
+from torchbrdf.linear import ImageBRDF
 from torchbrdf.models.oren_nayar.azimuth_paper import direct_mean_paper, two_bounce_mean_paper
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, modes_of
 from torchbrdf.models.oren_nayar.images import Bounces, flat_coefficients, mean_images

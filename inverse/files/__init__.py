@@ -1,0 +1,17 @@
+"""Photographs and measured reflectance on disk."""
+
+from inverse.files.reflectance import Measurements, read_gonioreflectometer, read_merl, read_optical_constants
+from inverse.files.stacks import Photographs, read_image, read_stack, usable, write_image, write_stack
+
+__all__ = [
+    "Measurements",
+    "Photographs",
+    "read_gonioreflectometer",
+    "read_image",
+    "read_merl",
+    "read_optical_constants",
+    "read_stack",
+    "usable",
+    "write_image",
+    "write_stack",
+]

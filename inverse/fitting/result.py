@@ -1,0 +1,128 @@
+"""What a fit returns."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import torch
+from torch import Tensor
+
+from torchbrdf import BRDF
+
+# Errors smaller than this, relative to the value, are printed as powers of ten.
+_SHOWN_EXACTLY = 1e-6
+
+
+_Value = TypeVar("_Value")
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """Fitted parameters, how well the data determine them, and how the fit ended.
+
+    Attributes:
+        parameters: by name, in the model's own units (angles in rad); also exposure and ambient when free.
+        standard_error: of each entry, from J'J and the residual: noise, not a wrong model or geometry.
+        names, correlation: labels and correlation matrix of the shared (not per-texel) parameters.
+        units: "rad" or "" by parameter name.
+        status: converged | at bound | not identified | out of steps | diverged.
+        reason: one sentence on the status.
+        residual_rms: of the used samples, in `residual_unit`.
+        samples: number of samples used.
+        model: a fitted copy of the model.
+        history: cost after each step.
+        residual_unit: "of full scale" (of the sensor) for photographs, "1/sr" for measured reflectance.
+    """
+
+    parameters: dict[str, Tensor]
+    standard_error: dict[str, Tensor]
+    names: list[str]
+    correlation: Tensor
+    units: dict[str, str]
+    status: str
+    reason: str
+    iterations: int
+    residual_rms: float
+    samples: int
+    seconds: float
+    model: BRDF
+    history: list[float]
+    residual_unit: str
+
+    def __str__(self) -> str:
+        rows = [("model", type(self.model).__name__)]
+        rows += [(name, self.estimate(name)) for name in self.parameters]
+        if len(self.names) > 1 and self.correlation.isfinite().all():
+            strongest = self.correlation.abs().fill_diagonal_(0.0)
+            i, j = divmod(int(strongest.argmax()), len(self.names))
+            if i != j:
+                rows.append(("correlation", f"{self.correlation[i, j]:+.2f} ({self.names[i]}, {self.names[j]})"))
+        rows.append(("residual rms", f"{self.residual_rms:.3g} {self.residual_unit}, {self.samples} samples"))
+        rows.append(("status", f"{self.status}: {self.reason} ({self.seconds:.2f} s)"))
+        width = max(14, *(len(name) + 2 for name, _ in rows))
+        return "\n".join(f"{name:<{width}}{text}" for name, text in rows)
+
+    def renamed(self, names: Mapping[str, str]) -> "FitResult":
+        """The same with other names for some parameters."""
+
+        def under_new_names(values: dict[str, _Value]) -> dict[str, _Value]:
+            return {names.get(name, name): value for name, value in values.items()}
+
+        return replace(
+            self,
+            parameters=under_new_names(self.parameters),
+            standard_error=under_new_names(self.standard_error),
+            units=under_new_names(self.units),
+            names=[names.get(name, name) for name in self.names],
+        )
+
+    def estimate(self, name: str) -> str:
+        """A parameter and its standard error as text, angles in degrees; a summary of a per-texel one."""
+        return _estimate(self.parameters[name], self.standard_error[name], self.units[name])
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain numbers, lists and strings; None for what is not finite. Angles in degrees, named so."""
+        found: dict[str, Any] = {"model": type(self.model).__name__, "status": self.status, "reason": self.reason}
+        for name, value in self.parameters.items():
+            key = f"{name}_degrees" if self.units[name] == "rad" else name
+            found[key] = _plain(in_display_unit(value, self.units[name]))
+            found[f"{key}_standard_error"] = _plain(in_display_unit(self.standard_error[name], self.units[name]))
+        found["names"], found["correlation"] = self.names, _plain(self.correlation)
+        found |= {"residual_rms": _plain(torch.tensor(self.residual_rms)), "samples": self.samples}
+        return found | {"iterations": self.iterations, "seconds": self.seconds}
+
+
+def in_display_unit(value: Tensor, unit: str) -> Tensor:
+    """Degrees for angles, the value itself otherwise."""
+    return torch.rad2deg(value) if unit == "rad" else value
+
+
+def _estimate(value: Tensor, error: Tensor, unit: str) -> str:
+    value, error = in_display_unit(value, unit).double(), in_display_unit(error, unit).double()
+    suffix = " deg" if unit == "rad" else ""
+    if value.numel() > 8:
+        known = error[error.isfinite()]
+        typical = f"{known.median():.2g}" if known.numel() else "unknown"
+        return f"{value.numel()} values, median {value.nanmedian():.4g}, median error {typical}{suffix}"
+    pairs = zip(value.flatten().tolist(), error.flatten().tolist(), strict=True)
+    return ", ".join(_plus_minus(v, e) + suffix for v, e in pairs)
+
+
+def _plus_minus(value: float, error: float) -> str:
+    """value +- error with the error's two leading digits."""
+    if not math.isfinite(error):
+        return f"{value:.4g} +- unknown"
+    if error < _SHOWN_EXACTLY * max(abs(value), 1):
+        return f"{value:.7g} +- {error:.1g}"
+    digits = max(0, 1 - math.floor(math.log10(error)))
+    return f"{value:.{digits}f} +- {error:.{digits}f}"
+
+
+def _plain(value: Tensor) -> Any:
+    def clean(x: Any) -> Any:
+        if isinstance(x, list):
+            return [clean(y) for y in x]
+        return x if math.isfinite(x) else None
+
+    return clean(value.detach().tolist())

@@ -1,0 +1,157 @@
+"""Radiance of a surface under lights, point by point and as images."""
+
+from collections.abc import Callable, Sequence
+
+import torch
+from numpy.polynomial.legendre import leggauss
+from torch import Tensor
+
+from inverse.scene import Arrival, Footprints, Light, Scene
+from inverse.transport.direct import unhidden
+from inverse.transport.exchange import passed_on
+from inverse.transport.radiosity import bounced, sky_share
+from torchbrdf import BRDF, Cosines, LinearBRDF, is_per_texel
+
+_AMBIENT_TABLE = 24
+_TEXEL_NODES = 16
+
+Values = Callable[[Tensor], Tensor]
+
+
+def render(scene: Scene, model: BRDF) -> Tensor:
+    """Radiance images (image, rows, columns, channel), averaged over each pixel, before the sensor.
+
+    Simulates what the scene has switched on; `Plan.render` what a plan keeps.
+    """
+    footprints = scene.footprints()
+    images = [radiance_of(footprints, lights, footprints.to_image)(model) for lights in scene.lights]
+    return torch.stack(torch.broadcast_tensors(*images))
+
+
+def radiance_of(
+    footprints: Footprints,
+    lights: Sequence[Light],
+    record: Values = lambda values: values,
+    *,
+    linear: LinearBRDF | None = None,
+    texels: Tensor | None = None,
+) -> Callable[[BRDF], Tensor]:
+    """Function from a model to what is recorded (..., channel) of its radiance under the lights of one image.
+
+    What does not depend on the model is done once, recording included.
+
+    Args:
+        record: linear function of values (point, channel), by default the values themselves.
+        linear: for models of this kind alone: its geometry images are kept, so that each further material
+            costs K multiply-adds. Used where no light has a uniform part.
+        texels: which points are recorded, for linear models with parameters per texel.
+    Per-texel parameters run over the points.
+    """
+    parts = [_direct(footprints, lights, record, linear, texels)]
+    if footprints.partner is not None:
+        parts.append(_exchanged(footprints, lights, record))
+    return lambda model: sum((part(model) for part in parts[1:]), parts[0](model))
+
+
+def _direct(
+    footprints: Footprints, lights: Sequence[Light], record: Values, linear: LinearBRDF | None, texels: Tensor | None
+) -> Callable[[BRDF], Tensor]:
+    if linear is None or any(light.uniform is not None for light in lights):
+        reflections = [reflected(footprints, light) for light in lights]
+        return lambda model: record(sum((part(model) for part in reflections[1:]), reflections[0](model)))
+    images = lit_basis(footprints, linear, lights)
+    basis = record(images.flatten(1)).unflatten(-1, images.shape[1:])
+
+    def contracted(model: BRDF) -> Tensor:
+        assert isinstance(model, LinearBRDF)
+        coefficients = model.coefficients()  # (channel, K), or (point, channel, K) if per texel
+        if coefficients.ndim > 2 and texels is not None:
+            coefficients = coefficients[texels]
+        return (basis * coefficients).sum(-1)
+
+    return contracted
+
+
+def _exchanged(footprints: Footprints, lights: Sequence[Light], record: Values) -> Callable[[BRDF], Tensor]:
+    """What parts of the solid send on to each other."""
+    assert footprints.partner is not None
+    bounces = bounced(footprints.partner, lights, footprints.points, footprints.normals)
+    images = torch.stack([record(bounce) for bounce in bounces])
+    return lambda model: passed_on(model, images)
+
+
+def cosines_to(arrival: Arrival, footprints: Footprints) -> Cosines:
+    """Cosines (point,) of light that arrives at the points."""
+    return Cosines.of(footprints.normals, arrival.direction, footprints.view, normalize=True)
+
+
+def received(cosines: Cosines, arrival: Arrival) -> Tensor:
+    """cos(light) irradiance (point, 1 or channel): the only place where a camera's image takes the light's cosine."""
+    return cosines.light[:, None] * arrival.irradiance
+
+
+def reflected(footprints: Footprints, light: Light) -> Callable[[BRDF], Tensor]:
+    """Function from a model to the radiance (point, channel) that it reflects of one light.
+
+    The geometry of a light with one direction is done once; of more there would be too much to keep.
+    """
+    place = footprints.points, footprints.normals, footprints.solid
+    sky = None
+    if light.uniform is not None and footprints.partner is not None:
+        sky = sky_share(footprints.partner, footprints.points, footprints.normals)[:, None]
+    kept = [] if light.extended else [(cosines_to(k, footprints), k) for k in unhidden(light, *place)]
+
+    def radiance(model: BRDF) -> Tensor:
+        total = footprints.normals.new_zeros(len(footprints.normals), 1)
+        if light.uniform is not None:
+            uniform = _uniform_reflected(model, footprints, light.uniform)
+            total = total + (uniform if sky is None else uniform * sky)
+        for cosines, arrival in kept:
+            total = total + model.evaluate(cosines) * received(cosines, arrival)
+        if light.extended:
+            for arrival in unhidden(light, *place):
+                cosines = cosines_to(arrival, footprints)
+                total = total + model.evaluate(cosines) * received(cosines, arrival)
+            total = total + _mirrored(model, footprints, light)
+        return total
+
+    return radiance
+
+
+def lit_basis(footprints: Footprints, model: LinearBRDF, lights: Sequence[Light]) -> Tensor:
+    """A linear model's geometry images times cosine and irradiance (point, 1 or channel, K), of lights without a
+    uniform part."""
+    total = footprints.normals.new_zeros(len(footprints.normals), 1, 1)
+    for light in lights:
+        for arrival in unhidden(light, footprints.points, footprints.normals, footprints.solid):
+            cosines = cosines_to(arrival, footprints)
+            total = total + received(cosines, arrival)[..., None] * model.basis(cosines)[:, None, :]
+    return total
+
+
+def _mirrored(model: BRDF, footprints: Footprints, light: Light) -> Tensor:
+    """What a mirror lobe, which f_r cannot show, sends of an extended light: its radiance in the mirror direction."""
+    normals, view = footprints.normals, footprints.view
+    image = 2 * (normals * view).sum(-1, keepdim=True) * normals - view
+    mirror = model.delta_reflectance(Cosines.of(normals, image, view, normalize=True))
+    return torch.zeros_like(normals[:, :1]) if mirror is None else mirror * light.seen(image)
+
+
+def _uniform_reflected(model: BRDF, footprints: Footprints, uniform: Tensor | float) -> Tensor:
+    """Radiance (point, channel) under uniform light: the directional albedo times its radiance.
+
+    The albedo is smooth in the view cosine, so it is computed at a few and interpolated by the
+    polynomial through them (3e-4 for the Oren-Nayar models up to 85 degrees). A per-texel material has
+    an albedo of its own at each point, which is integrated there, with fewer nodes.
+    """
+    cos_view = (footprints.normals * footprints.view).sum(-1).clamp(0, 1)
+    strength = torch.as_tensor(uniform).to(cos_view)
+    if is_per_texel(model):
+        return model.directional_albedo(cos_view, nodes=_TEXEL_NODES) * strength
+    nodes = cos_view.new_tensor((1 + leggauss(_AMBIENT_TABLE)[0]) / 2)
+    albedo = model.directional_albedo(nodes)
+    powers = torch.linalg.solve(torch.vander(2 * nodes - 1).to(albedo), albedo)
+    total = powers[0].expand(len(cos_view), -1)
+    for coefficient in powers[1:]:
+        total = total * (2 * cos_view[:, None] - 1) + coefficient
+    return total * strength

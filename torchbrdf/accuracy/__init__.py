@@ -1,0 +1,37 @@
+"""What accuracy costs: ladders of models against their references, in error, time and memory."""
+
+from torchbrdf.accuracy.ladders import (
+    RUNGS,
+    Ladder,
+    Row,
+    Rung,
+    cost,
+    forward_ratios,
+    interleaved_medians,
+    ladder,
+    reference,
+    relative_errors,
+)
+from torchbrdf.accuracy.series import (
+    SeriesLadder,
+    SeriesRow,
+    expanded,
+    series_ladder,
+)
+
+__all__ = [
+    "RUNGS",
+    "Ladder",
+    "Row",
+    "Rung",
+    "SeriesLadder",
+    "SeriesRow",
+    "cost",
+    "expanded",
+    "forward_ratios",
+    "interleaved_medians",
+    "ladder",
+    "reference",
+    "relative_errors",
+    "series_ladder",
+]

@@ -1,0 +1,239 @@
+"""Surfaces of mirror-like facets: the half vector, facet distributions, masking and shadowing.
+
+The half vector comes from the vectors, or from components along the tangent, and keeps its digits. From dot products
+alone (`Cosines.from_products`) its inclination is a difference and known to about eps/alpha^2 (relative).
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from numpy.polynomial.legendre import leggauss
+from torch import Tensor
+
+from torchbrdf._numerics import angle_over_sine, dot, safe_divide
+from torchbrdf.directions import Cosines
+from torchbrdf.v_cavity import geometric_attenuation
+
+# exp(-x^2/2) beyond is below 1e-17 of what lies before.
+_GAUSSIAN_END = 9.0
+_NODES, _WEIGHTS = (a.tolist() for a in leggauss(48))
+_NEWTON_STEPS = 6
+_BISECTIONS = 54
+# erfcx and the first exponential agree to rounding long before; exp(-a^2) underflows anyway.
+_BECKMANN_OPEN = 1 / 64
+
+
+@dataclass(frozen=True)
+class HalfVector:
+    """The half vector h = (light + view)/|light + view|, as far as facets need it. Finite below the horizon.
+
+    Attributes:
+        cos: normal . h (...), in (0, 1]. [-]
+        sine_squared: 1 - cos^2 (...), exactly 0 in the mirror direction. [-]
+        cos_light: light . h = view . h (...). [-]
+        tangent, bitangent: components of h in the surface (...); None when no tangent was given.
+    """
+
+    cos: Tensor
+    sine_squared: Tensor
+    cos_light: Tensor
+    tangent: Tensor | None = None
+    bitangent: Tensor | None = None
+
+    @classmethod
+    def of(cls, cosines: Cosines) -> "HalfVector":
+        up = cosines.light + cosines.view
+        if cosines.tangent is not None:
+            plane = cosines.tangent_plane
+            along = plane.light_tangent + plane.view_tangent
+            across = plane.light_bitangent + plane.view_bitangent
+            flat = along * along + across * across
+            squared = flat + up * up
+            length = squared.sqrt()
+            return cls(up / length, flat / squared, length / 2, along / length, across / length)
+        if cosines.vectors is not None:
+            normal, light, view = cosines.vectors
+            total = light + view
+            planar = total - dot(total, normal)[..., None] * normal
+            flat = dot(planar, planar).masked_fill(~cosines.above_horizon, 0.0)
+            squared = flat + up * up
+        else:
+            # rounding can leave |l + v|^2 below the square of its own component along the normal
+            squared = torch.maximum(2 * (1 + cosines.phase), up * up)
+            flat = squared - up * up
+        length = squared.sqrt()
+        return cls(up / length, flat / squared, length / 2)
+
+    def tilt_squared(self) -> Tensor:
+        """Squared angle between normal and half vector (...). [rad^2]"""
+        return self.sine_squared * angle_over_sine(self.cos) ** 2
+
+    def stretched(self, alpha_x: Tensor, alpha_y: Tensor) -> Tensor:
+        """(h_x/alpha_x)^2 + (h_y/alpha_y)^2 (...). Raises ValueError without a tangent."""
+        if self.tangent is None or self.bitangent is None:
+            raise ValueError("an anisotropic distribution needs a tangent: pass tangent=... to Cosines.of.")
+        return (self.tangent / alpha_x) ** 2 + (self.bitangent / alpha_y) ** 2
+
+
+def v_cavity_masking(cosines: Cosines, half: HalfVector) -> Tensor:
+    r"""Share of a facet of a symmetric V-cavity that is lit and seen, when it mirrors light into view.
+
+    .. math:: G = \min\Big(1, \frac{2 (n \cdot h) \min(n \cdot l, n \cdot v)}{l \cdot h}\Big)
+
+    Returns: G (...), in (0, 1]. [-] 1 in the exact mirror direction.
+    Deviations: the Oren-Nayar texts print Max for the outer bracket; the derivation, and energy, ask for Min.
+    Source: Torrance & Sparrow 1967; Oren & Nayar 1994, eq. (33).
+    """
+    return geometric_attenuation(
+        half.cos_light, half.cos_light, cos_light=cosines.light, cos_view=cosines.view, cos_facet=half.cos
+    )
+
+
+def slope_area_norm(sigma: Tensor) -> Tensor:
+    r"""Solid angle (...) by which exp(-theta^2/2 sigma^2) over the hemisphere is normalised.
+
+    .. math:: 1/c = 2 \pi \int_0^{\pi/2} e^{-\theta^2/2\sigma^2} \sin\theta\, d\theta
+
+    Gauss-Legendre in theta/sigma: relative error below 1e-14 for sigma [rad] in (0, pi/2]; 2 pi sigma^2, the
+    usual shortcut, is 9 % off at 0.5. [sr] Gradients of all orders.
+    """
+    return sigma * sigma * _slope_area_integral(sigma, torch.full_like(sigma, math.pi / 2))
+
+
+def _slope_area_integral(sigma: Tensor, end: Tensor) -> Tensor:
+    """2 pi/sigma^2 times the integral of exp(-theta^2/2 sigma^2) sin(theta) from 0 to end [rad] (...)."""
+    nodes, weights = sigma.new_tensor(_NODES), sigma.new_tensor(_WEIGHTS)
+    s = sigma[..., None]
+    last = (end[..., None] / s).clamp(max=_GAUSSIAN_END)
+    x = last * (1 + nodes) / 2
+    integrand = (-0.5 * x * x).exp() * x * torch.sinc(s * x / math.pi)
+    return (math.pi * weights * last * integrand).sum(-1)
+
+
+def slope_area_angle(u: Tensor, sigma: Tensor) -> Tensor:
+    """Facet angle (...) [rad] below which a share u (...) in [0, 1) of `slope_area` lies: its inverse integral.
+
+    Newton's method in the square of the angle, in which the integral is nearly that of an exponential.
+    """
+    s2 = sigma * sigma
+    right = torch.full_like(u, math.pi / 2)
+    total = _slope_area_integral(sigma.expand_as(u), right)
+    end = (math.pi**2 / 4 / s2).clamp(max=_GAUSSIAN_END**2).expand_as(u)
+    y = -2 * torch.log1p(u * torch.expm1(-end / 2))  # (theta/sigma)^2, exact where sin(theta) = theta
+    for _ in range(_NEWTON_STEPS):
+        theta = y.sqrt() * sigma
+        slope = math.pi * (-y / 2).exp() * torch.sinc(theta / math.pi)
+        step = (_slope_area_integral(sigma.expand_as(u), theta) - u * total) / slope
+        y = torch.minimum((y - step).relu(), end)
+    return y.sqrt() * sigma
+
+
+def visible_azimuth(u: Tensor, slope: Tensor) -> Tensor:
+    """Azimuth from the view (...) [rad] of density clip(1 + slope cos(phi), 0, 2)/(2 pi): V-cavity facets in sight.
+
+    `slope` is tan(facet angle) tan(view angle) (...) >= 0. By bisection, to rounding.
+    """
+    side = torch.where(u < 0.5, torch.ones_like(u), -torch.ones_like(u))
+    target = math.pi * torch.where(u < 0.5, 2 * u, 2 * u - 1)
+    # beyond the edge the partner is out of sight and the facet takes its light: density 2, or 0
+    edge = torch.where(slope > 1, torch.acos(1 / slope.clamp(min=1.0)), torch.zeros_like(slope))
+    low, high = edge, math.pi - edge
+    offset = edge - slope * edge.sin()
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2
+        early = middle + slope * middle.sin() + offset < target
+        low, high = torch.where(early, middle, low), torch.where(early, high, middle)
+    return side * torch.where(target < 2 * edge, target / 2, (low + high) / 2)
+
+
+def slope_area(half: HalfVector, *, sigma: Tensor) -> Tensor:
+    r"""Share of projected area per solid angle of facet normals, :math:`P = c\,e^{-\theta^2/2\sigma^2}` (...). [1/sr]
+
+    Args:
+        sigma: roughness (...). [rad] > 0
+    Source: Torrance & Sparrow 1967; slope-area convention of Oren & Nayar 1994.
+    """
+    return (-0.5 * half.tilt_squared() / (sigma * sigma)).exp() / slope_area_norm(sigma)
+
+
+def ggx_distribution(half: HalfVector, *, alpha: Tensor) -> Tensor:
+    r"""Facets per area and solid angle, :math:`D = \frac{1}{\pi \alpha^2 (\sin^2/\alpha^2 + \cos^2)^2}` (...). [1/sr]
+
+    Source: Trowbridge & Reitz 1975; Walter et al. 2007.
+    """
+    return _ggx(half, half.sine_squared / (alpha * alpha), alpha * alpha)
+
+
+def anisotropic_ggx_distribution(half: HalfVector, *, alpha_x: Tensor, alpha_y: Tensor) -> Tensor:
+    """`ggx_distribution` with widths alpha_x along the tangent and alpha_y across it (...). [1/sr]"""
+    return _ggx(half, half.stretched(alpha_x, alpha_y), alpha_x * alpha_y)
+
+
+def _ggx(half: HalfVector, stretched: Tensor, area: Tensor) -> Tensor:
+    q = stretched + half.cos * half.cos
+    return 1 / (math.pi * (area * q * q))  # a number times a 0-d tensor has float64 tangents in torch 2.13
+
+
+def beckmann_distribution(half: HalfVector, *, alpha: Tensor) -> Tensor:
+    r"""Facets per area and solid angle, :math:`D = \frac{e^{-\tan^2/\alpha^2}}{\pi \alpha^2 \cos^4}` (...). [1/sr]
+
+    Source: Beckmann & Spizzichino 1963; Cook & Torrance 1982.
+    """
+    return _beckmann(half, half.sine_squared / (alpha * alpha), alpha * alpha)
+
+
+def anisotropic_beckmann_distribution(half: HalfVector, *, alpha_x: Tensor, alpha_y: Tensor) -> Tensor:
+    """`beckmann_distribution` with widths alpha_x along the tangent and alpha_y across it (...). [1/sr]"""
+    return _beckmann(half, half.stretched(alpha_x, alpha_y), alpha_x * alpha_y)
+
+
+def _beckmann(half: HalfVector, stretched: Tensor, area: Tensor) -> Tensor:
+    cos_squared = half.cos * half.cos
+    # in one exponent: cos^-4 overflows where the exponential has long vanished
+    return (-stretched / cos_squared - 2 * cos_squared.log()).exp() / area / math.pi
+
+
+def ggx_lambda(slope_squared: Tensor) -> Tensor:
+    r"""Smith's Lambda of GGX: shadowed over lit area, :math:`T / 2 (1 + \sqrt{1 + T})` (...). [-]
+
+    Args:
+        slope_squared: T = (alpha tan(theta))^2, or its anisotropic form (...). [-] >= 0
+    """
+    return slope_squared / (2 * (1 + (1 + slope_squared).sqrt()))
+
+
+def beckmann_lambda(slope_squared: Tensor) -> Tensor:
+    r"""Smith's Lambda of Beckmann: :math:`\tfrac12 e^{-a^2} (1/a\sqrt\pi - \mathrm{erfcx}(a))`, a = T^-1/2 (...). [-]
+
+    Args:
+        slope_squared: T = (alpha tan(theta))^2, or its anisotropic form (...). [-] >= 0
+    """
+    open_ = slope_squared <= _BECKMANN_OPEN
+    a = slope_squared.masked_fill(open_, 1.0).rsqrt()
+    value = 0.5 * (-a * a).exp() * (1 / (a * math.sqrt(math.pi)) - torch.special.erfcx(a))
+    return value.masked_fill(open_, 0.0)
+
+
+def smith_correlated(cosines: Cosines, half: HalfVector, lambda_light: Tensor, lambda_view: Tensor) -> Tensor:
+    """Masking and shadowing by one height field: 1/(1 + Lambda_l + Lambda_v) (...). [-]"""
+    return 1 / (1 + lambda_light + lambda_view)
+
+
+def smith_separable(cosines: Cosines, half: HalfVector, lambda_light: Tensor, lambda_view: Tensor) -> Tensor:
+    """Masking and shadowing as if independent: the product of both (...). [-]"""
+    return 1 / ((1 + lambda_light) * (1 + lambda_view))
+
+
+def v_cavities(cosines: Cosines, half: HalfVector, lambda_light: Tensor, lambda_view: Tensor) -> Tensor:
+    """`v_cavity_masking` in the place of Smith's functions (...). [-]"""
+    return v_cavity_masking(cosines, half)
+
+
+Masking = Callable[[Cosines, HalfVector, Tensor, Tensor], Tensor]
+
+
+def tangent_squared(cosine: Tensor) -> Tensor:
+    """tan^2 of a polar angle with cosine > 0 (...)."""
+    return safe_divide(((1 - cosine) * (1 + cosine)).relu(), cosine * cosine, where=cosine > 0)

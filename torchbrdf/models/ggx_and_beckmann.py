@@ -1,0 +1,204 @@
+"""Microfacet models with Smith masking: GGX and Beckmann, isotropic and anisotropic."""
+
+from typing import final
+
+import torch
+from torch import Tensor
+
+from torchbrdf.brdf import BRDF
+from torchbrdf.directions import Cosines
+from torchbrdf.facets import (
+    HalfVector,
+    Masking,
+    anisotropic_beckmann_distribution,
+    anisotropic_ggx_distribution,
+    beckmann_distribution,
+    beckmann_lambda,
+    ggx_distribution,
+    ggx_lambda,
+    smith_correlated,
+    tangent_squared,
+)
+from torchbrdf.fresnel import Fresnel, Schlick
+from torchbrdf.parameters import WIDTH, Constrained, fixed
+from torchbrdf.sampling import mirrored, visible_beckmann_facet, visible_ggx_facet
+
+
+class _Microfacet(BRDF):
+    r"""f_r = F D G / (4 cos_i cos_r), with D, Lambda and the widths of a subclass."""
+
+    fresnel: Fresnel
+    masking: Masking
+
+    def distribution(self, half: HalfVector) -> Tensor:
+        """D (...). [1/sr]"""
+        raise NotImplementedError
+
+    def smith_lambda(self, slope_squared: Tensor) -> Tensor:
+        """Lambda (...) at T = (alpha tan(theta))^2. [-]"""
+        raise NotImplementedError
+
+    def visible_facet(self, view: Tensor, u: Tensor) -> Tensor:
+        """Facet normals (..., 3) in proportion to their area seen along the local view (..., 3)."""
+        raise NotImplementedError
+
+    def slopes_squared(self, cosines: Cosines) -> tuple[Tensor, Tensor]:
+        """T of light and of view (...). [-]"""
+        raise NotImplementedError
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        half = HalfVector.of(cosines)
+        lambdas = [self.smith_lambda(t) for t in self.slopes_squared(cosines)]
+        shadowing = self.masking(cosines, half, *lambdas)
+        lobe = self.distribution(half) * shadowing / (4 * cosines.light * cosines.view)
+        return {"specular": lobe[..., None] * self.fresnel(half.cos_light)}
+
+    def propose(self, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:
+        light = mirrored(view, self.visible_facet(view, u))
+        return light, torch.zeros_like(light[..., 0], dtype=torch.bool)
+
+    def density(self, cosines: Cosines) -> Tensor:
+        _, of_view = self.slopes_squared(cosines)
+        seen = 1 / (1 + self.smith_lambda(of_view))
+        return self.distribution(HalfVector.of(cosines)) * seen / (4 * cosines.view)
+
+
+class _Isotropic(_Microfacet):
+    alpha: Constrained = Constrained(WIDTH)
+
+    def __init__(
+        self,
+        *,
+        alpha: Tensor | float | fixed = 0.3,
+        fresnel: Fresnel | None = None,
+        masking: Masking = smith_correlated,
+    ):
+        super().__init__()
+        self.alpha = alpha
+        self.fresnel = Schlick(f0=self.alpha.new_tensor(0.04)) if fresnel is None else fresnel
+        self.masking = masking
+
+    def slopes_squared(self, cosines: Cosines) -> tuple[Tensor, Tensor]:
+        a2 = self.alpha * self.alpha
+        return a2 * tangent_squared(cosines.light), a2 * tangent_squared(cosines.view)
+
+    def _widths(self) -> tuple[Tensor, Tensor]:
+        return self.alpha, self.alpha
+
+
+class _Anisotropic(_Microfacet):
+    alpha_x: Constrained = Constrained(WIDTH)
+    alpha_y: Constrained = Constrained(WIDTH)
+    anisotropic = True
+
+    def __init__(
+        self,
+        *,
+        alpha_x: Tensor | float | fixed = 0.1,
+        alpha_y: Tensor | float | fixed = 0.4,
+        fresnel: Fresnel | None = None,
+        masking: Masking = smith_correlated,
+    ):
+        super().__init__()
+        self.alpha_x = alpha_x
+        self.alpha_y = alpha_y
+        self.fresnel = Schlick(f0=self.alpha_x.new_tensor(0.04)) if fresnel is None else fresnel
+        self.masking = masking
+
+    def slopes_squared(self, cosines: Cosines) -> tuple[Tensor, Tensor]:
+        c, plane = cosines, cosines.tangent_plane
+        ax, ay = self._widths()
+        light = ((ax * plane.light_tangent) ** 2 + (ay * plane.light_bitangent) ** 2) / (c.light * c.light)
+        view = ((ax * plane.view_tangent) ** 2 + (ay * plane.view_bitangent) ** 2) / (c.view * c.view)
+        return light, view
+
+    def _widths(self) -> tuple[Tensor, Tensor]:
+        return self.alpha_x, self.alpha_y
+
+
+@final
+class GGX(_Isotropic):
+    r"""Mirror-like facets with the long-tailed GGX distribution.
+
+    .. math:: f_r = \frac{F D G_2}{4 \cos\theta_i \cos\theta_r}, \quad G_2 = \frac{1}{1 + \Lambda_i + \Lambda_r}
+
+    with D of `ggx_distribution`, Lambda of `ggx_lambda`.
+
+    Args:
+        alpha: width, scalar or (...). [-] in [0.001, 1]; narrower lobes are a `Mirror`.
+        fresnel: reflectance of a facet; Schlick (0.04) if not given.
+        masking: G_2: smith_correlated, smith_separable or v_cavities.
+    Components: specular.
+    Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.69 of the light at normal incidence.
+    Source: Walter et al. 2007; Heitz 2014.
+    """
+
+    def distribution(self, half: HalfVector) -> Tensor:
+        return ggx_distribution(half, alpha=self.alpha)
+
+    def smith_lambda(self, slope_squared: Tensor) -> Tensor:
+        return ggx_lambda(slope_squared)
+
+    def visible_facet(self, view: Tensor, u: Tensor) -> Tensor:
+        return visible_ggx_facet(view, *self._widths(), u)
+
+
+@final
+class AnisotropicGGX(_Anisotropic):
+    """`GGX` with widths alpha_x along the tangent and alpha_y across it, each scalar or (...). [-] in [0.001, 1]
+
+    Args, components, deviations and source as `GGX`; needs a tangent.
+    """
+
+    def distribution(self, half: HalfVector) -> Tensor:
+        return anisotropic_ggx_distribution(half, alpha_x=self.alpha_x, alpha_y=self.alpha_y)
+
+    def smith_lambda(self, slope_squared: Tensor) -> Tensor:
+        return ggx_lambda(slope_squared)
+
+    def visible_facet(self, view: Tensor, u: Tensor) -> Tensor:
+        return visible_ggx_facet(view, *self._widths(), u)
+
+
+@final
+class Beckmann(_Isotropic):
+    r"""Mirror-like facets with Gaussian slopes.
+
+    .. math:: f_r = \frac{F D G_2}{4 \cos\theta_i \cos\theta_r}, \quad G_2 = \frac{1}{1 + \Lambda_i + \Lambda_r}
+
+    with D of `beckmann_distribution`, Lambda of `beckmann_lambda`.
+
+    Args:
+        alpha: width, scalar or (...). [-] in [0.001, 1]; sqrt(2) times the rms slope.
+        fresnel: reflectance of a facet; Schlick (0.04) if not given.
+        masking: G_2: smith_correlated, smith_separable or v_cavities.
+    Components: specular.
+    Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.94 of the light at normal incidence.
+    Source: Beckmann & Spizzichino 1963; Cook & Torrance 1982; Heitz 2014.
+    """
+
+    def distribution(self, half: HalfVector) -> Tensor:
+        return beckmann_distribution(half, alpha=self.alpha)
+
+    def smith_lambda(self, slope_squared: Tensor) -> Tensor:
+        return beckmann_lambda(slope_squared)
+
+    def visible_facet(self, view: Tensor, u: Tensor) -> Tensor:
+        return visible_beckmann_facet(view, *self._widths(), u)
+
+
+@final
+class AnisotropicBeckmann(_Anisotropic):
+    """`Beckmann` with widths alpha_x along the tangent and alpha_y across it, each scalar or (...). [-] in [0.001, 1]
+
+    Args, components, deviations and source as `Beckmann`; needs a tangent.
+    """
+
+    def distribution(self, half: HalfVector) -> Tensor:
+        return anisotropic_beckmann_distribution(half, alpha_x=self.alpha_x, alpha_y=self.alpha_y)
+
+    def smith_lambda(self, slope_squared: Tensor) -> Tensor:
+        return beckmann_lambda(slope_squared)
+
+    def visible_facet(self, view: Tensor, u: Tensor) -> Tensor:
+        return visible_beckmann_facet(view, *self._widths(), u)

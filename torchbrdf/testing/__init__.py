@@ -1,0 +1,45 @@
+"""The laws every BRDF obeys, as functions to run on your own model; each raises AssertionError with what it saw."""
+
+from torchbrdf.testing.laws import (
+    TOLERANCE,
+    Directions,
+    Tolerance,
+    assert_broadcasts_like_a_loop,
+    assert_energy,
+    assert_finite,
+    assert_float32_matches_float64,
+    assert_gradients,
+    assert_keeps_dtype,
+    assert_nonnegative,
+    assert_reciprocal,
+    assert_zero_below_horizon,
+    hard_directions,
+    magnitude,
+    random_directions,
+)
+from torchbrdf.testing.sampling import (
+    assert_density_integrates,
+    assert_samples_follow_pdf,
+    assert_weights,
+)
+
+__all__ = [
+    "TOLERANCE",
+    "Directions",
+    "Tolerance",
+    "assert_broadcasts_like_a_loop",
+    "assert_density_integrates",
+    "assert_energy",
+    "assert_finite",
+    "assert_float32_matches_float64",
+    "assert_gradients",
+    "assert_keeps_dtype",
+    "assert_nonnegative",
+    "assert_reciprocal",
+    "assert_samples_follow_pdf",
+    "assert_weights",
+    "assert_zero_below_horizon",
+    "hard_directions",
+    "magnitude",
+    "random_directions",
+]
