@@ -15,6 +15,7 @@ from inverse.scene.lights import (
     Light,
     Point,
     SimplerLight,
+    as_channels,
 )
 from inverse.scene.maps import from_depth, from_normals
 from inverse.scene.scene import Scene
@@ -51,6 +52,7 @@ __all__ = [
     "Sensor",
     "SimplerLight",
     "Surface",
+    "as_channels",
     "cuboid",
     "cylinder",
     "from_depth",

@@ -162,7 +162,7 @@ class Point(Light):
 
     def simpler(self, middle: Tensor) -> tuple[SimplerLight, ...]:
         away = self.position.to(middle) - middle
-        distant = Distant(away, torch.as_tensor(self.intensity) / (away * away).sum())
+        distant = Distant(away, self.intensity / (away * away).sum())
         choice = "as strong as in the middle of the object, from one direction"
         return (SimplerLight(NEAR_LIGHT, choice, distant),)
 
@@ -197,7 +197,9 @@ class Disc(Light):
     @property
     def radiance(self) -> Tensor:
         """Of every point of the source, (channel,) or scalar."""
-        return torch.as_tensor(self.irradiance) / (math.pi * math.sin(self.half_angle) ** 2)
+        given = isinstance(self.irradiance, Tensor)
+        strength = torch.as_tensor(self.irradiance, dtype=None if given else torch.float64)
+        return strength / (math.pi * math.sin(self.half_angle) ** 2)
 
     def arrivals(self, points: Tensor) -> Iterator[Arrival]:
         """The nodes of (31): radiance times the solid angle each stands for."""
@@ -219,7 +221,7 @@ class Disc(Light):
     def seen(self, direction: Tensor) -> Tensor:
         """Radiance (..., channel) that comes from unit directions (..., 3)."""
         inside = (direction * self.direction.to(direction)).sum(-1, keepdim=True) >= math.cos(self.half_angle)
-        return torch.atleast_1d(self.radiance).to(direction) * inside
+        return as_channels(self.radiance, direction) * inside
 
     def beams(self) -> tuple[Light, ...]:
         return (self._centred(),)
@@ -345,9 +347,14 @@ def _unit(name: str, value: Tensor) -> Tensor:
     return vector / length
 
 
+def as_channels(strength: Tensor | float, like: Tensor) -> Tensor:
+    """A strength as (1 or channel,), in the dtype and on the device of another tensor."""
+    return torch.atleast_1d(torch.as_tensor(strength, dtype=like.dtype, device=like.device))
+
+
 def _row(strength: Tensor | float, points: Tensor) -> Tensor:
     """A strength as (1, 1 or channel), in the dtype of the points."""
-    return torch.atleast_1d(torch.as_tensor(strength)).to(points)[None]
+    return as_channels(strength, points)[None]
 
 
 def _check_strength(name: str, value: Tensor | float) -> None:

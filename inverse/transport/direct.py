@@ -3,10 +3,9 @@
 import math
 from collections.abc import Iterator, Sequence
 
-import torch
 from torch import Tensor
 
-from inverse.scene import Arrival, Light
+from inverse.scene import Arrival, Light, as_channels
 from inverse.shapes import Solid
 from inverse.transport.shadows import unshadowed
 
@@ -31,7 +30,7 @@ def direct_irradiance(
     total = normals.new_zeros(len(normals), 1)
     for light in lights:
         if light.uniform is not None:
-            uniform = math.pi * torch.atleast_1d(torch.as_tensor(light.uniform)).to(normals)
+            uniform = math.pi * as_channels(light.uniform, normals)
             total = total + (uniform if sky is None else uniform * sky[:, None])
         for arrival in unhidden(light, points, normals, solid):
             cosine = (normals * arrival.direction).sum(-1, keepdim=True).clamp(min=0)

@@ -6,7 +6,7 @@ import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
-from inverse.scene import Arrival, Footprints, Light, Scene
+from inverse.scene import Arrival, Footprints, Light, Scene, as_channels
 from inverse.transport.direct import unhidden
 from inverse.transport.exchange import passed_on
 from inverse.transport.radiosity import bounced, sky_share
@@ -145,7 +145,7 @@ def _uniform_reflected(model: BRDF, footprints: Footprints, uniform: Tensor | fl
     an albedo of its own at each point, which is integrated there, with fewer nodes.
     """
     cos_view = (footprints.normals * footprints.view).sum(-1).clamp(0, 1)
-    strength = torch.as_tensor(uniform).to(cos_view)
+    strength = as_channels(uniform, cos_view)
     if is_per_texel(model):
         return model.directional_albedo(cos_view, nodes=_TEXEL_NODES) * strength
     nodes = cos_view.new_tensor((1 + leggauss(_AMBIENT_TABLE)[0]) / 2)
