@@ -79,8 +79,8 @@ class SigmaBias:
         lengths = derivative.norm(dim=0)
         seen = lengths > 0
         residual = (self.reference - values).double().reshape(-1, 1) * self.root
-        found = torch.linalg.lstsq(derivative[:, seen] / lengths[seen], residual, driver="gelsd").solution[:, 0]
-        change = torch.zeros_like(lengths).masked_scatter(seen, found / lengths[seen])
+        step = torch.linalg.lstsq(derivative[:, seen] / lengths[seen], residual, driver="gelsd").solution[:, 0]
+        change = torch.zeros_like(lengths).masked_scatter(seen, step / lengths[seen])
         biases = [abs(float(change[place]) * slope) for places in sigmas.values() for place, slope in places]
         worst = max(biases + lost)
         return worst if math.isfinite(worst) else math.inf

@@ -54,8 +54,8 @@ class Revolution(Body):
     def hit(self, origin: Tensor, direction: Tensor) -> Tensor:
         origin, direction = torch.broadcast_tensors(origin.double(), direction.double())
         flat = [k.reshape(-1, 3) for k in (origin, direction)]
-        found = [self._march(*piece) for piece in zip(*(k.split(1 << 14) for k in flat), strict=True)]
-        return torch.cat(found).reshape(origin.shape[:-1])
+        distances = [self._march(*piece) for piece in zip(*(k.split(1 << 14) for k in flat), strict=True)]
+        return torch.cat(distances).reshape(origin.shape[:-1])
 
     def normal(self, points: Tensor) -> Tensor:
         x, y, z = points.double().unbind(-1)
