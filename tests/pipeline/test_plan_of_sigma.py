@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from inverse import Distant, Scene, Sensor, everything, fit, plan, plane, render, sphere
-from torchbrdf import FastRoughSurface, OrenNayar, RoughSurface, TorranceSparrow, fixed
+from torchbrdf import FastRoughSurface, HeTorrance, OrenNayar, RoughSurface, TorranceSparrow, fixed
 
 FRONT, OBLIQUE = Distant.from_angle(0), Distant.from_angle(20)
 
@@ -64,3 +64,10 @@ def test_plan_of_sigma_drops_more_when_there_is_more_noise():
     kinds = [type(plan(k, clay(0.7, 0.3), 0.5, of="sigma").model) for k in (scene, loud)]
     assert kinds[0] in (RoughSurface, FastRoughSurface)
     assert kinds[1] not in (RoughSurface, FastRoughSurface)
+
+
+def test_a_length_called_sigma_is_no_angle():
+    """sigma0 of He-Torrance is a height: there is no roughness angle to plan for."""
+    scene = Scene(sphere(16, 16), [FRONT, OBLIQUE], SENSOR)
+    with pytest.raises(ValueError, match="needs a model with a trained sigma; found HeTorrance"):
+        plan(scene, HeTorrance(sigma0=0.2, tau=2.0, wavelength=0.5, eta=1.5, diffuse=0.3), 1.0, of="sigma")
