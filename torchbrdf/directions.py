@@ -207,7 +207,8 @@ def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
 def any_tangent(normal: Tensor) -> Tensor:
     """A unit vector (..., 3) perpendicular to the unit normal, smooth except where normal_z changes sign.
 
-    Source: Duff et al. 2017, Building an Orthonormal Basis, Revisited.
+    Source: Duff, Burgess, Christensen, Hery, Kensler, Liani & Villemin 2017, "Building an orthonormal basis,
+        revisited", Journal of Computer Graphics Techniques 6(1).
     """
     x, y, z = normal.unbind(-1)
     sign = torch.where(z < 0, -torch.ones_like(z), torch.ones_like(z))

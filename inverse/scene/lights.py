@@ -132,7 +132,7 @@ class Point(Light):
     Attributes:
         position: (3,), in the unit of the surface's points (half image heights).
         intensity: scalar or (channel,). [W/sr for lengths in m]
-    Source: course notes eqs. (20), (26).
+    Source: Fleet & Hertzmann 2006, "Computer Graphics Lecture Notes", University of Toronto, eqs. (20), (26).
     """
 
     position: Tensor
@@ -202,7 +202,7 @@ class Disc(Light):
         return strength / (math.pi * math.sin(self.half_angle) ** 2)
 
     def arrivals(self, points: Tensor) -> Iterator[Arrival]:
-        """The nodes of (31): radiance times the solid angle each stands for."""
+        """The nodes of Fleet & Hertzmann 2006, eq. (31): radiance times the solid angle each stands for."""
         edge = math.cos(self.half_angle)
         nodes, weights = leggauss(self.rings)
         axis = self.direction.double()

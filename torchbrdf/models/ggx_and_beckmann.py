@@ -130,7 +130,9 @@ class GGX(_Isotropic):
         masking: G_2: smith_correlated, smith_separable or v_cavities.
     Components: specular.
     Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.69 of the light at normal incidence.
-    Source: Walter et al. 2007; Heitz 2014.
+    Source: Walter, Marschner, Li & Torrance 2007, "Microfacet models for refraction through rough surfaces", DOI
+        10.2312/EGWR/EGSR07/195-206, eq. (33); Heitz 2014, "Understanding the masking-shadowing function in
+        microfacet-based BRDFs", Journal of Computer Graphics Techniques 3(2), eqs. (72), (99).
     """
 
     def distribution(self, half: HalfVector) -> Tensor:
@@ -174,7 +176,8 @@ class Beckmann(_Isotropic):
         masking: G_2: smith_correlated, smith_separable or v_cavities.
     Components: specular.
     Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.94 of the light at normal incidence.
-    Source: Beckmann & Spizzichino 1963; Cook & Torrance 1982; Heitz 2014.
+    Source: Beckmann & Spizzichino 1963, The Scattering of Electromagnetic Waves from Rough Surfaces; Cook & Torrance
+        1982, "A reflectance model for computer graphics", DOI 10.1145/357290.357293; Heitz 2014 (as `GGX`), eq. (99).
     """
 
     def distribution(self, half: HalfVector) -> Tensor:

@@ -57,7 +57,7 @@ class Mirror(_Polished):
     Args:
         fresnel: reflectance; Perfect (F = 1) if not given.
     Components: specular (0).
-    Source: course notes eqs. (37), (38).
+    Source: Fleet & Hertzmann 2006, "Computer Graphics Lecture Notes", University of Toronto, eqs. (37), (38).
     """
 
     def __init__(self, *, fresnel: Fresnel | None = None):
@@ -90,7 +90,9 @@ class Coupled(_Polished):
         21 (1 - f0)/(20 pi): the published 21/(20 pi (1 - f0)) goes with (1 - F), not with 1 - (1 - c)^5, and as
         printed reflects 1.10 of the light at f0 = 0.05. That also means that photographs show rho (1 - f0) alone: to
         fit, hold one of the two fixed.
-    Source: Shirley et al. 1997; Fundamentals of Computer Graphics, eqs. (25.1)-(25.3), corrected.
+    Source: Shirley, Smits, Hu & Lafortune 1997, "A practitioners' assessment of light reflection models", Pacific
+        Graphics; Shirley & Marschner 2009, Fundamentals of Computer Graphics, 3rd edition, eqs. (25.1)-(25.3),
+        corrected.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -127,7 +129,7 @@ class Dampened(_Polished):
     Components: matte. The mirror lobe is sampled, not evaluated: see `Mirror`.
     Deviations: not reciprocal: F is that of the view. `Coupled` is the model to use. With Schlick's F photographs show
         rho (1 - f0) alone.
-    Source: Shirley et al., Fundamentals of Computer Graphics, ch. 25.
+    Source: Shirley & Marschner 2009, Fundamentals of Computer Graphics, 3rd edition, ch. 25, smooth-layered model.
     """
 
     albedo: Constrained = Constrained(ALBEDO)

@@ -1,4 +1,4 @@
-"""Phong's highlight: the radiance of the course notes, and three BRDFs with the same lobe."""
+"""Phong's highlight: the radiance that Fleet & Hertzmann 2006 teach, and three BRDFs with the same lobe."""
 
 import math
 from typing import final
@@ -43,7 +43,8 @@ def phong_radiance(
     Returns: L (..., channel). Below the horizon of light or view the ambient part alone.
     Deviations: as printed the highlight leaks through surfaces turned away from the light; here it does not.
         0^0 = 1.
-    Source: course notes, eqs. (39), (40).
+    Source: Phong 1975, "Illumination for computer generated pictures", DOI 10.1145/360825.360839; in this form Fleet &
+        Hertzmann 2006, "Computer Graphics Lecture Notes", University of Toronto, eqs. (39), (40).
     """
     lobe = safe_power(mirror_cosine(cosines)[..., None], torch.as_tensor(exponent)[..., None])
     lit = torch.atleast_1d(diffuse) * light * cosines.light[..., None] + torch.atleast_1d(specular) * highlight * lobe
@@ -110,7 +111,7 @@ class Phong(_Phong):
         exponent: n, scalar or (...). [-] >= 0
     Components: diffuse, specular.
     Deviations: not reciprocal, and unbounded at grazing light. Prefer `ModifiedPhong` or `MaxCosinePhong`.
-    Source: course notes eq. (39), divided by the irradiance.
+    Source: Phong 1975 (`phong_radiance`); Fleet & Hertzmann 2006, eq. (39), divided by the irradiance.
     """
 
     def lobe_factor(self, cosines: Cosines, exponent: Tensor) -> Tensor:
@@ -128,7 +129,8 @@ class ModifiedPhong(_Phong):
         exponent: n, scalar or (...). [-] >= 0
     Components: diffuse, specular.
     Deviations: the specular albedo is k_s at normal incidence and falls as the cosine: dark at grazing.
-    Source: Lafortune & Willems 1994.
+    Source: Lafortune & Willems 1994, "Using the modified Phong reflectance model for physically based rendering",
+        Report CW 197, KU Leuven.
     """
 
     def lobe_factor(self, cosines: Cosines, exponent: Tensor) -> Tensor:
@@ -145,7 +147,8 @@ class MaxCosinePhong(_Phong):
         diffuse, specular: k_d, k_s, scalar, (channel,) or (..., channel). [-] in [0, 1]; sum <= 1 conserves
         exponent: n, scalar or (...). [-] >= 0
     Components: diffuse, specular.
-    Source: Neumann, Neumann & Szirmay-Kalos 1999.
+    Source: Neumann, Neumann & Szirmay-Kalos 1999, "Compact metallic reflectance models", Computer Graphics Forum 18(3),
+        161-172.
     """
 
     def lobe_factor(self, cosines: Cosines, exponent: Tensor) -> Tensor:

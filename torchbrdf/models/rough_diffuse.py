@@ -97,7 +97,8 @@ class FujiiOrenNayar(_RoughDiffuse):
         roughness: r, scalar or (...). [-] in [0, 1]; 0 is Lambert.
     Components: direct.
     Deviations: darkens with roughness, as no light is reflected twice: white-sky albedo 0.83 rho at r = 1.
-    Source: Fujii 2012; Portsmouth, Kutz & Hill 2025.
+    Source: Fujii 2013, "A tiny improvement of Oren-Nayar reflectance model", at
+        mimosa-pudica.net/improved-oren-nayar.html; Portsmouth, Kutz & Hill 2025 (as `EON`).
     """
 
     def __init__(self, *, albedo: Tensor | float | fixed = 0.5, roughness: Tensor | float | fixed = 0.5):
@@ -132,7 +133,8 @@ class EON(_RoughDiffuse):
         roughness: r, scalar or (...). [-] in [0, 1]; 0 is Lambert.
         exact: False takes the quartic for G, as renderers do; the furnace is then 0.9998 to 1.
     Components: direct, interreflection.
-    Source: Portsmouth, Kutz & Hill 2025, EON: A practical energy-preserving rough diffuse BRDF.
+    Source: Portsmouth, Kutz & Hill 2025, "EON: A practical energy-preserving rough diffuse BRDF", Journal of Computer
+        Graphics Techniques 14(1), arXiv:2410.18026.
     """
 
     def __init__(

@@ -51,7 +51,9 @@ class TabulatedBRDF(BRDF):
         or not finite.
     Deviations: what the table holds. Light and view may be exchanged, and the two sides of the plane of incidence
         are one; below the horizon 0 whatever the table says. Values are measured, not trained: a buffer.
-    Source: Rusinkiewicz 1998; Matusik et al. 2003.
+    Source: Rusinkiewicz 1998, "A new change of variables for efficient BRDF representation", DOI
+        10.1007/978-3-7091-6453-2_2; Matusik, Pfister, Brand & McMillan 2003, "A data-driven reflectance model", DOI
+        10.1145/882262.882343.
     """
 
     uniform_share = 0.25

@@ -37,12 +37,16 @@ def torrance_sparrow(
         cosines: of light, view and phase angle, each (...).
         sigma: roughness, scalar or (...). [rad] in (0, pi/2]
         fresnel: F at the half vector (..., channel). [-]
-        normalised: False leaves out c/4, as (31) does, for k_s values of the paper: then k_s has the unit 1/sr.
+        normalised: False leaves out c/4, as Oren & Nayar 1994, eq. (31), for k_s values of that paper: k_s is then in
+            1/sr.
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when sigma leaves its domain.
     Deviations: grows as 1/cos^2 towards grazing in the mirror direction, while the directional albedo stays
         <= 1; single reflection only.
-    Source: Torrance & Sparrow 1967; Oren & Nayar 1994, eqs. (31)-(33), with Min for the misprinted Max.
+    Source: Torrance & Sparrow 1967, "Theory for off-specular reflection from roughened surfaces", DOI
+        10.1364/JOSA.57.001105; Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI
+        10.1145/192161.192213, long version (1995, DOI 10.1007/BF01679684), eqs. (31)-(33), (38), with Min for the
+        misprinted Max.
     """
     ROUGHNESS.check("torrance_sparrow: sigma", sigma)
     half = HalfVector.of(cosines)
@@ -63,11 +67,11 @@ class TorranceSparrow(BRDF):
     Args:
         sigma: roughness, scalar or (...). [rad]
         fresnel: reflectance of a facet; Perfect (F = 1) if not given.
-        normalised: False leaves out c/4, as (31) of Oren & Nayar does.
+        normalised: False leaves out c/4, as Oren & Nayar 1994, eq. (31).
     Components: specular.
     Raises: ValueError outside the domain.
 
-    The body and surface mixture (32) of Oren & Nayar is `k_b * OrenNayar(...) + k_s * TorranceSparrow(...)`.
+    The body and surface mixture of Oren & Nayar 1994, eq. (32), is `k_b * OrenNayar(...) + k_s * TorranceSparrow(...)`.
     """
 
     sigma: Constrained = Constrained(ROUGHNESS)

@@ -68,8 +68,8 @@ def diffracted(geometry: Geometry, *, sigma0: Tensor, tau: Tensor, wavelength: T
         \frac{G S D}{\pi c_i c_r} = \frac{|h|^4}{\pi} \Big(\frac{\pi^2 \sigma \tau}{\lambda^2}\Big)^2
         \frac{S(g, t)}{g}\, \frac{S_1(\theta_i)}{c_i} \frac{S_1(\theta_r)}{c_r}
 
-    with G = |h|^4/h_z^2 and D of (76), (78). In this order of factors nothing overflows at grazing, in
-    retro-reflection or at normal incidence.
+    with G = |h|^4/h_z^2 and D of He et al. 1991, eqs. (76), (78). In this order of factors nothing overflows at
+    grazing, in retro-reflection or at normal incidence.
 
     Args: sigma0, tau (..., 1), wavelength (channel,), one unit of length.
     """

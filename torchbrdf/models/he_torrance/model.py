@@ -64,7 +64,8 @@ class HeTorrance(BRDF):
     Warns: UserWarning, at construction, when a exceeds `energy_bound` (parameters per pixel are not looked at), or
         when tau is so far from the wavelength that their units seem to differ.
     Deviations: as `he_torrance`; the first-surface parts themselves reach 1.022 at grazing (perfect reflector).
-    Source: He, Torrance, Sillion & Greenberg 1991.
+    Source: He, Torrance, Sillion & Greenberg 1991, "A comprehensive physical model for light reflection", DOI
+        10.1145/127719.122738, eqs. (4)-(9), (71)-(83).
     """
 
     PARTS = ("specular", "directional_diffuse", "uniform_diffuse")

@@ -66,11 +66,12 @@ def he_torrance(
             (channel,) or (..., channel). [-] in [0, 1]
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when a parameter leaves its domain or the numbers of channels differ.
-    Deviations: a/pi, where (72) prints a. G is evaluated as |h|^4/h_z^2, to which (76) reduces. Shadowing has the
+    Deviations: a/pi, where eq. (72) prints a. G is |h|^4/h_z^2, to which eq. (76) reduces. Shadowing has the
         factor exp(-b^2) of Smith's integral. Single reflection, tangent-plane (Kirchhoff) fields: tau should exceed
         the wavelength. Energy is not exactly conserved: with sigma0 = 0.05, tau = 3, lambda = 0.5 a perfect
         reflector (both parts) returns 1.022 of the light from 86 degrees and 0.44 at 89; nothing is clamped.
-    Source: He, Torrance, Sillion & Greenberg 1991, eqs. (4)-(9), (71)-(83).
+    Source: He, Torrance, Sillion & Greenberg 1991, "A comprehensive physical model for light reflection", DOI
+        10.1145/127719.122738, eqs. (4)-(9), (71)-(83).
     """
     check_surface("he_torrance", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k, diffuse=diffuse)
     lobe = directional_diffuse(cosines, sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
@@ -105,7 +106,7 @@ def specular_reflectivity(
     Returns: rho_s (..., channel). [-] Mirrored radiance = rho_s times the radiance of what is mirrored.
     Raises: ValueError when a parameter leaves its domain or the numbers of channels differ.
     Deviations: underflows to 0, gradient included, for g > 87 in float32.
-    Source: He et al. 1991, eqs. (6), (70), (73).
+    Source: He et al. 1991 (DOI 10.1145/127719.122738), eqs. (6), (70), (73).
     """
     check_surface("specular_reflectivity", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
     return mirror_reflectance(cos, sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)

@@ -49,13 +49,14 @@ def series_over_g(g: Tensor, t: Tensor) -> Tensor:
     Args:
         g: squared phase of the roughness, (v_z sigma)^2 >= 0. [-] Broadcasts with t.
         t: squared lateral phase, (v_xy tau)^2/4 >= 0. [-]
-        Neither is checked: both are squares. The sum over m of the paper is g times this.
+        Neither is checked: both are squares. The sum over m in eq. (78) is g times this.
     Returns: (...), in the dtype of the inputs, with first and second derivatives in reverse and forward mode.
     Raises: TypeError unless both are float32 or both float64; NotImplementedError for a third derivative.
     Accuracy: 1e-11 relative in float64, 1e-6 + 3 eps (1 + |ln(g S)|) in float32, where an exponent of 60 carries
         60 eps. Derivatives are evaluated in float64: 1e-10 of the larger of themselves and a thousandth of
         S/g/max(g, 1), rounded to the dtype. Exponentials below the smallest normal number are 0.
-    Source: He, Torrance, Sillion & Greenberg 1991, eqs. (7), (78).
+    Source: He, Torrance, Sillion & Greenberg 1991, "A comprehensive physical model for light reflection", DOI
+        10.1145/127719.122738, eqs. (7), (78).
     """
     if g.dtype != t.dtype or g.dtype not in _SCHEMES:
         raise TypeError(f"series_over_g: g and t must both be float32 or both float64; found {g.dtype} and {t.dtype}")

@@ -38,7 +38,8 @@ class AnisotropicRoughSurface(CltcSampled, ImageBRDF):
     Raises: ValueError outside the domains, and without a tangent.
     Deviations: every cavity adds kinks of its own, so the error falls slowly with the number of nodes; three and
         more bounces are left out. With derivatives for sigma, nodes * azimuths * bounces numbers a pixel are kept.
-    Source: Oren & Nayar 1994 (long version), eqs. (8), (22); two widths: own.
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+        (1995, DOI 10.1007/BF01679684), eqs. (8), (22); two widths: own.
     """
 
     anisotropic = True

@@ -1,13 +1,14 @@
-r"""Azimuth means of interreflected light over facets of one slope angle: closed form of (48) plus a small correction by
-quadrature.
+r"""Azimuth means of interreflected light over facets of one slope angle: closed form of an approximation plus a small
+correction by quadrature.
 
-Exact exchange and the mean of (48) differ only where a facet is shadowed or masked. With z the light's and b the view's
+Exact exchange, Oren & Nayar 1994, eq. (19), and the mean of the approximate one, their eq. (48), differ only where a
+facet is shadowed or masked. With z the light's and b the view's
 projection, the difference is a sum of
     (1 + c(b)) e(z) + (1 + c(z)) e(b)     e(z) <= 0 on the lobe z > 1, 0 elsewhere: "one direction is cut",
     M(z, b)                               on the overlap z > 1, b > 1: "both are cut",
 so the quadrature runs over two half lobes and over the two overlaps of the lobes, on which every integrand is analytic;
-nodes never straddle a kink and lobes that do not exist have zero width. Own derivation from (19); see
-`interreflection.two_bounce_integrand` for the notation.
+nodes never straddle a kink and lobes that do not exist have zero width. Own derivation from
+Oren & Nayar 1994, eq. (19); see `interreflection` for the source and `two_bounce_integrand` there for the notation.
 """
 
 import math
@@ -132,7 +133,9 @@ def two_bounce_mean(
 
 
 def one_cut_share(z: Tensor, cos_slope: Tensor) -> Tensor:
-    """e(z) / S^2 = 1/P(z) - 1/(1+C) for z >= 1 (...): what (48) overrates when the light alone is cut. [-]"""
+    """e(z) / S^2 = 1/P(z) - 1/(1+C) for z >= 1 (...): what Oren & Nayar 1994, eq. (48), overrates
+    when the light alone is cut. [-]
+    """
     return 1 / reach(z, cos_slope) - 1 / (1 + cos_slope)
 
 
@@ -152,7 +155,9 @@ def _lobe_mean(plane: SlopePlane, lobes: Lobes, order: int, scale: Tensor | None
 
 
 def _both_cut(z: Tensor, b: Tensor, cos_slope: Tensor) -> Tensor:
-    """M(z, b) / S^2: exact exchange less (48) less the two single cuts; 0 on the rim of the overlap."""
+    """M(z, b) / S^2: exact exchange less that of Oren & Nayar 1994, eq. (48), less the two single cuts; 0 on the
+    rim of the overlap.
+    """
     return (z + b - 2) / (1 + cos_slope) - strip_mismatch(z, b, cos_slope)
 
 

@@ -84,7 +84,7 @@ def fast_rough_surface(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, bounc
         bounded f cos, no figures. At light = view, a cone of the exact reflectance, the subgradient is 0. Compiled
         with one trained sigma, first derivatives only: take second ones from the function as it is.
     Source: fitted here to the exact model (`examples/fast_fit`); small-sigma form from the expansion
-        of the integral, d ~ 1 - sigma^2 + sigma^2 p.q, i ~ sigma^2.
+        of the integral, d ~ 1 - sigma^2 + sigma^2 p.q, i ~ sigma^2 (`docs/equations/oren_nayar.md`, section 6).
     """
     ALBEDO.check("fast_rough_surface: albedo", albedo)
     ROUGHNESS.check("fast_rough_surface: sigma", sigma)

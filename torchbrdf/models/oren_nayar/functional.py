@@ -1,4 +1,4 @@
-"""Functional approximation of the Oren-Nayar integral, (27)-(29) of the paper's long version."""
+"""Functional approximation of the integral of Oren & Nayar 1994, eqs. (27)-(29) of the long version."""
 
 import math
 from typing import final
@@ -35,7 +35,8 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
         (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`);
         it turns negative at forward grazing for sigma > 0.66 rad, and at rho = 1 its directional albedo
         reaches 1.05 at grazing.
-    Source: Oren & Nayar 1994 (long version), eqs. (27)-(29).
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+        (1995, DOI 10.1007/BF01679684), eqs. (27)-(29).
     """
     ALBEDO.check("oren_nayar: albedo", albedo)
     ROUGHNESS.check("oren_nayar: sigma", sigma)
@@ -45,7 +46,7 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
 
 
 def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """The four functions of geometry in (27), (28), each (...), without an angle.
+    """The four functions of geometry in Oren & Nayar 1994, eqs. (27), (28), each (...), without an angle.
 
     1, cos(dphi) C2 tan(beta) and (1 - |cos(dphi)|) C3 tan((alpha+beta)/2) with the constants and the
     sigma-quotients taken out, and cos(dphi) (2 beta/pi)^2. Every quotient left is bounded or has

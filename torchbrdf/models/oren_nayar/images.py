@@ -5,7 +5,8 @@ r"""Images of a rough surface of unit albedo: what the geometry contributes, slo
 D (direct), I (two bounces) and H (more) depend on the directions only, the weights w on the roughness only, the rest on
 the albedo only: a new sigma or rho costs multiply-adds. The images of a facet come from `attenuation` (what is lit and
 seen) and `interreflection` (what the facets exchange); their azimuth means from `azimuth` and `azimuth_quadrature`.
-Source: Oren & Nayar 1994, eqs. (8), (22), (23), (25).
+Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+    (1995, DOI 10.1007/BF01679684), eqs. (8), (22), (23), (25); bounces beyond the second: own derivation.
 """
 
 import math
@@ -102,7 +103,7 @@ def cavity_images(
     bounces: Bounces,
     modes: CavityModes | None = None,
 ) -> Images:
-    """Mean of the two facets u and -u of each cavity, eq. (22): exact, no azimuth mean.
+    """Mean of the two facets u and -u of each cavity, Oren & Nayar 1994, eq. (22): exact, no azimuth mean.
 
     Args: u.p, u.q and cos(theta_a), broadcast to (..., K); `modes` of those K slopes for three and more bounces.
     Returns: `Images`, not masked at the horizon. [1/sr]

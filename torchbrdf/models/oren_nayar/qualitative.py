@@ -1,4 +1,4 @@
-"""Qualitative Oren-Nayar model, (30): the two-term form in common use."""
+"""Qualitative model of Oren & Nayar 1994, eq. (30): the two-term form in common use."""
 
 import math
 from typing import final
@@ -29,7 +29,8 @@ def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: 
     Deviations: from the exact model with all bounces 15 % rms and 219 % (0.33) or 250 % (0.57) at worst
         (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`).
         At the kink cos(dphi) = 0 the subgradient is that of the flat side.
-    Source: Oren & Nayar 1994, eq. (30) and footnote 7 of the long version.
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, eq. (30), and
+        footnote 7 of its long version (1995, DOI 10.1007/BF01679684).
     """
     ALBEDO.check("qualitative: albedo", albedo)
     ROUGHNESS.check("qualitative: sigma", sigma)

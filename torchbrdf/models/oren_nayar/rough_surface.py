@@ -102,7 +102,8 @@ class RoughSurface(SharedSlopes):
         3e-3 at order 4 for sigma = 0.9, by 1e-4 at order 16. Below the node spacing some weights are negative (to
         -0.8): the sum is accurate, the weights are no distribution; sample slopes with `sample_slope`. Kinks: at
         light = view the zero subgradient is chosen; fractional powers where tan(theta) tan(theta_k) = 1.
-    Source: Oren & Nayar 1994 (long version), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+        (1995, DOI 10.1007/BF01679684), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -148,7 +149,7 @@ class TabulatedRoughSurface(SharedSlopes):
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError for weights that are no shares, and as `RoughSurface`.
     Deviations: a distribution narrower than the distance of neighbouring slopes is not resolved.
-    Source: as `RoughSurface`, eq. (25) with any distribution.
+    Source: Oren & Nayar 1994, long version (as `RoughSurface`), eq. (25) with any distribution.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -185,7 +186,7 @@ class TabulatedRoughSurface(SharedSlopes):
 
 @final
 class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
-    """Gaussian slopes over the paper's closed forms of one slope: (45) direct, (49) two bounces.
+    """Gaussian slopes over closed forms of one slope: Oren & Nayar 1994, eqs. (45) direct, (49) two bounces.
 
     Args:
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
@@ -194,9 +195,9 @@ class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
     Components: direct, two_bounce.
     Raises: ValueError outside the domains or for nodes < 3.
     Deviations: the closed forms are exact for direct light in and across the plane of incidence and interpolated
-        between, and (48) approximates the exchange. From the exact model with all bounces: 4.3 % rms, 20 % at worst
+        between, and eq. (48) approximates the exchange. From the exact model with all bounces: 4.3 % rms, 20 % at worst
         (up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`).
-    Source: Oren & Nayar 1994 (long version), eqs. (24), (25), (45), (49).
+    Source: Oren & Nayar 1994, long version (as `RoughSurface`), eqs. (24), (25), (45), (48), (49).
     """
 
     albedo: Constrained = Constrained(ALBEDO)
