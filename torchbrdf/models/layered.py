@@ -86,7 +86,7 @@ class Coupled(_Polished):
         albedo: rho of the body, scalar, (channel,) or (..., channel). [-] in [0, 1]; 1 reflects everything.
         fresnel: Schlick (0.04) if not given; Dielectric is exact.
     Components: matte. The mirror lobe is sampled, not evaluated: see `Mirror`.
-    Deviations: the matte part has the fitted shape of the paper. With Schlick's F the constant is
+    Deviations: the matte part has the fitted shape of Shirley et al. 1997. With Schlick's F the constant is
         21 (1 - f0)/(20 pi): the published 21/(20 pi (1 - f0)) goes with (1 - F), not with 1 - (1 - c)^5, and as
         printed reflects 1.10 of the light at f0 = 0.05. That also means that photographs show rho (1 - f0) alone: to
         fit, hold one of the two fixed.

@@ -23,7 +23,7 @@ def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: 
         cosines: of light, view and phase angle, each (...).
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
         sigma: roughness, scalar or (...). [rad] in [0, pi/2]; 0 is Lambert exactly.
-        a_constant: 0.33; the paper's footnote offers 0.57 to make up for the missing interreflection.
+        a_constant: 0.33; footnote 7 of the source offers 0.57 to make up for the missing interreflection.
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo or sigma leave their domains.
     Deviations: from the exact model with all bounces 15 % rms and 219 % (0.33) or 250 % (0.57) at worst
