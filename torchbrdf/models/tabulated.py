@@ -63,7 +63,8 @@ class TabulatedBRDF(BRDF):
         or not finite.
     Deviations: what the table holds. Light and view may be exchanged, and the two sides of the plane of incidence
         are one; below the horizon 0 whatever the table says. A table whose rows theta_h = 0 or theta_d = 0 depend on
-        phi_d, which has no meaning there, jumps in the mirror or the retro direction. Values are measured, not trained: a buffer.
+        phi_d, which has no meaning there, jumps in the mirror or the retro direction. Values are
+        measured, not trained: a buffer.
     Source: Rusinkiewicz 1998; Matusik et al. 2003.
     """
 

@@ -42,8 +42,8 @@ def slope_plane(cosines: Cosines) -> SlopePlane:
     Below the horizon all fields describe a light and a view along the normal.
     """
     if cosines.vectors is None:
-        tangents = [safe_sqrt((1 - c) * (1 + c)) / c for c in (cosines.alpha, cosines.beta)]
-        return _from_tangents(*tangents, cosines.in_plane / (cosines.light * cosines.view))
+        tan_light, tan_view = (safe_sqrt((1 - c) * (1 + c)) / c for c in (cosines.alpha, cosines.beta))
+        return _from_tangents(tan_light, tan_view, cosines.in_plane / (cosines.light * cosines.view))
     normal, light, view = cosines.vectors
     below = ~cosines.above_horizon[..., None]
     # n x s / (n.s) is p turned by 90 degrees, exactly 0 where light and normal are one.
