@@ -123,6 +123,23 @@ def test_others_compile(backend):
     assert_compiles(every_other(torch.float32), few(16, torch.float32), backend)  # code generation: minutes
 
 
+IN_ONE_GRAPH_OF_ANY_SHAPE = ("lambert", "hapke")  # a bounded and an unbounded domain; the others by hand
+
+
+@pytest.mark.parametrize(
+    "model",
+    [pytest.param(m, marks=() if m.name in IN_ONE_GRAPH_OF_ANY_SHAPE else pytest.mark.slow) for m in MODELS],
+    ids=lambda m: m.name,
+)
+def test_captured_in_one_graph_of_any_shape(model):
+    torch.compiler.reset()
+    brdf = model.make(torch.float32)
+    captured = torch.compile(brdf, fullgraph=True, dynamic=True, backend="eager")
+    for count in (16, 33):
+        directions = few(count, torch.float32)
+        assert_same(captured(*directions), brdf(*directions), torch.float32)
+
+
 def assert_compiles(brdf: BRDF, directions: laws.Directions, backend: str) -> None:
     torch.compiler.reset()
     compiled = torch.compile(brdf, fullgraph=True, backend=backend)
