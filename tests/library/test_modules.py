@@ -97,6 +97,24 @@ def test_to_float64(model):
     laws.assert_keeps_dtype(brdf, *few(4))
 
 
+@pytest.mark.parametrize("parameters", [torch.float32, torch.float64], ids=["float32", "float64"])
+def test_parameters_and_directions_of_two_dtypes_meet_in_the_wider(model, parameters):
+    other = torch.float32 if parameters == torch.float64 else torch.float64
+    brdf, directions = model.make(parameters), few(8, other)
+    if not any(True for _ in (*brdf.parameters(), *brdf.buffers())):
+        pytest.skip("has no numbers of its own")
+    parts = brdf.components(*directions)
+    albedo = brdf.directional_albedo(torch.tensor([0.3, 0.8], dtype=other))
+    u = torch.rand(8, 2, dtype=other, generator=torch.Generator().manual_seed(3))
+    drawn = brdf.sample(directions.normal, directions.view, u)
+    assert {f.dtype for f in (brdf(*directions), albedo, drawn.weight, *parts.values())} == {torch.float64}
+    assert drawn.light.dtype == other
+    assert brdf.pdf(*directions).isfinite().all()
+    # what is computed in the wider dtype differs by the rounding of the narrower one
+    exact = copy.deepcopy(brdf).double()(*(torch.nn.functional.normalize(v.double(), dim=-1) for v in directions))
+    torch.testing.assert_close(brdf(*directions), exact, rtol=2e-3, atol=1e-5)
+
+
 def test_functional_call_reads_the_given_parameters(model):
     brdf, directions = model.make(torch.float64), few(4)
     moved = {name: (p + 0.3).detach() for name, p in brdf.named_parameters()}
