@@ -75,6 +75,11 @@ def cross(a: Tensor, b: Tensor) -> Tensor:
     return torch.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), -1)
 
 
+def length(vector: Tensor) -> Tensor:
+    """Length (...) of vectors (..., 3), with zero gradient where it is 0."""
+    return safe_sqrt(dot(vector, vector))
+
+
 def safe_sqrt(x: Tensor) -> Tensor:
     """sqrt(x), and 0 with zero gradient where rounding left x at or below 0."""
     empty = x <= 0
@@ -88,8 +93,12 @@ def safe_divide(numerator: Tensor, denominator: Tensor, *, where: Tensor) -> Ten
 
 def safe_atan2(y: Tensor, x: Tensor) -> Tensor:
     """Polar angle of (x, y) in (-pi, pi]; 0 with zero gradient at the origin, where it has no meaning. [rad]"""
-    origin = (x == 0) & (y == 0)
-    return torch.atan2(y.masked_fill(origin, 0.0), x.masked_fill(origin, 1.0))
+    # The larger coordinate is divided out, which the angle does not notice: the derivative has the squares below it,
+    # and they may underflow.
+    scale = torch.maximum(x.abs(), y.abs()).detach()
+    origin = scale < torch.finfo(scale.dtype).tiny
+    scale = scale.masked_fill(origin, 1.0)
+    return torch.atan2((y / scale).masked_fill(origin, 0.0), (x / scale).masked_fill(origin, 1.0))
 
 
 def arcsec(x: Tensor) -> Tensor:
@@ -108,6 +117,11 @@ def arccsc(x: Tensor) -> Tensor:
 def sinc(x: Tensor) -> Tensor:
     """sin(x)/x, 1 at 0, smooth to every order in reverse and forward mode."""
     return torch.sinc(x / math.pi)
+
+
+def positive_part(x: Tensor) -> Tensor:
+    """max(x, 0) with the derivative 1/2 at 0, the mean of both sides: what |x| beside it takes for its own."""
+    return torch.maximum(x, x.new_zeros(()))
 
 
 def positive(x: Tensor) -> Tensor:

@@ -55,7 +55,7 @@ class Interval:
 
     def to_raw(self, value: Tensor) -> Tensor:
         """Unconstrained coordinate of a value inside the domain."""
-        if math.isinf(self.high):
+        if self.high == math.inf:
             return (value - self.low).log()
         return torch.logit((value - self.low) / (self.high - self.low))
 
@@ -63,7 +63,7 @@ class Interval:
         """Value inside the domain for any real number."""
         # At least 1-D inside: forward differentiation of "number * 0-d float32 tensor" yields float64.
         row = torch.atleast_1d(raw)
-        inside = row.exp() if math.isinf(self.high) else (self.high - self.low) * row.sigmoid()
+        inside = row.exp() if self.high == math.inf else (self.high - self.low) * row.sigmoid()
         return (self.low + inside).reshape(raw.shape)
 
 

@@ -78,7 +78,7 @@ class _Phong(BRDF):
         exponent = self.exponent[..., None]
         lobe = safe_power(mirror_cosine(cosines)[..., None], exponent)
         return {
-            "diffuse": (torch.atleast_1d(self.diffuse) / math.pi).expand(*lobe.shape[:-1], -1),
+            "diffuse": torch.atleast_1d(self.diffuse) / math.pi * torch.ones_like(lobe),
             "specular": torch.atleast_1d(self.specular) * self.lobe_factor(cosines, exponent) * lobe,
         }
 

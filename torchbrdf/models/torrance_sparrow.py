@@ -57,7 +57,8 @@ def _lobe(cosines: Cosines, half: HalfVector, sigma: Tensor, normalised: bool) -
     spread = slope_area(half, sigma=sigma) / 4
     if not normalised:
         spread = 4 * (spread * slope_area_norm(sigma))
-    return v_cavity_masking(cosines, half) * spread / (cosines.light * cosines.view * half.cos)
+    lobe = v_cavity_masking(cosines, half) * spread / (cosines.light * cosines.view * half.cos)
+    return lobe.to(torch.promote_types(lobe.dtype, sigma.dtype))  # a number alone would not widen it
 
 
 @final

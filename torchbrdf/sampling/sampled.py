@@ -39,7 +39,7 @@ class Sampled:
             axes = torch.stack((t, cross(normal, t), normal.expand_as(t)), -1)
             local = (axes * view[..., :, None]).sum(-2)
             proposed, delta = self.propose(local, u)
-            light = (axes * proposed[..., None, :]).sum(-1)
+            light = (axes * proposed.to(axes.dtype)[..., None, :]).sum(-1)
             light = light / light.norm(dim=-1, keepdim=True)
         cosines = Cosines.of(normal, light, view, tangent=t)
         with torch.no_grad():

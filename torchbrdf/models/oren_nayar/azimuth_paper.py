@@ -11,7 +11,7 @@ import math
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import safe_divide, safe_sqrt
+from torchbrdf._numerics import positive_part, safe_divide, safe_sqrt
 from torchbrdf.models.oren_nayar.azimuth import Lobes, saturated_lobes
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane
 
@@ -27,8 +27,9 @@ def direct_mean_paper(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor
     # normal, so it is split off.
     steep, half_steep, half_flat = _ordered(lobes)
     in_plane = _in_plane(plane, steep, half_steep, lobes)
-    forward = (2 / math.pi) * (half_flat - _flat(lobes) * half_flat.sin()) * cos_delta.clamp(max=0)
-    return cos_slope * (1 + in_plane + forward + (1 - cos_delta.abs()) * _across(plane, lobes)) / math.pi
+    away = positive_part(-cos_delta)
+    forward = (2 / math.pi) * (half_flat - _flat(lobes) * half_flat.sin()) * away
+    return cos_slope * (1 + in_plane - forward + (1 - cos_delta.abs()) * _across(plane, lobes)) / math.pi
 
 
 def two_bounce_mean_paper(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> Tensor:

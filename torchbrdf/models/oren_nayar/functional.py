@@ -6,6 +6,7 @@ from typing import final
 import torch
 from torch import Tensor
 
+from torchbrdf._numerics import positive_part
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
@@ -55,8 +56,9 @@ def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor
     g = cosines
     beta_squared = g.sin_beta * g.sin_beta * g.beta_over_sine**2
     # tan(beta) cos(dphi) = (in_plane / sin(alpha)) / cos(beta); the cubic only acts where dphi > 90 deg
-    forward = g.in_plane.clamp(max=0) * g.sine_ratio * (2 / math.pi) ** 3 * g.beta_over_sine * beta_squared
-    along = (g.in_plane - forward) / g.beta
+    away = positive_part(-g.in_plane)
+    cubic = away * g.sine_ratio * (2 / math.pi) ** 3 * g.beta_over_sine * beta_squared
+    along = (g.in_plane + cubic) / g.beta
     bounce = g.in_plane * g.sine_ratio * g.beta_over_sine**2 * (2 / math.pi) ** 2
     if not c3:
         return torch.ones_like(g.beta), along, torch.zeros_like(g.beta), bounce

@@ -6,6 +6,7 @@ from typing import final
 import torch
 from torch import Tensor
 
+from torchbrdf._numerics import positive_part
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
@@ -28,7 +29,7 @@ def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: 
     Raises: ValueError when albedo or sigma leave their domains.
     Deviations: from the exact model with all bounces 15 % rms and 219 % (0.33) or 250 % (0.57) at worst
         (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`).
-        At the kink cos(dphi) = 0 the subgradient is that of the flat side.
+        At the kink cos(dphi) = 0 the subgradient is the mean of both sides.
     Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, eq. (30), and
         footnote 7 of its long version (1995, DOI 10.1007/BF01679684).
     """
@@ -43,7 +44,7 @@ def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: 
 
 def geometry_terms(cosines: Cosines) -> tuple[Tensor, Tensor]:
     """1 and max(0, cos(dphi)) sin(alpha) tan(beta), each (...), without an angle."""
-    return torch.ones_like(cosines.beta), cosines.in_plane.relu() / cosines.beta
+    return torch.ones_like(cosines.beta), positive_part(cosines.in_plane) / cosines.beta
 
 
 def qualitative_coefficients(albedo: Tensor, sigma: Tensor, a_constant: float) -> Tensor:
