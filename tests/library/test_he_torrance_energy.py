@@ -8,7 +8,8 @@ import torch
 from test_he_torrance import GOLDEN, UP, doubles, material
 from torch.testing import assert_close
 
-from torchbrdf import HeTorrance, fixed, sampling_laws
+from torchbrdf import HeTorrance, fixed
+from torchbrdf import testing as laws
 from torchbrdf.models.he_torrance.energy import lobe_albedo
 from torchbrdf.models.he_torrance.reflectance import specular_reflectivity
 from torchbrdf.models.he_torrance.spike import cone_overlap
@@ -67,7 +68,7 @@ def test_albedo_agrees_with_monte_carlo():
     for angle in (0.3, 1.4):
         brdf = model(0.1, 1.0, 0.5, 0.77 + 6.08j, diffuse=fixed(doubles([0.05])))
         with torch.no_grad():
-            weight = sampling_laws._Setting.of(brdf, angle).draw(40_000, torch.Generator().manual_seed(1)).weight
+            weight = laws.SamplingSetup.of(brdf, angle).draw(40_000, torch.Generator().manual_seed(1)).weight
         expected = brdf.directional_albedo(doubles(math.cos(angle)))
         assert abs(float(weight.mean() - expected)) < 5 * float(weight.std()) / math.sqrt(40_000)
 
@@ -87,7 +88,7 @@ def test_sampling_variance(parameters, degrees, variance, largest):
     # variance over squared mean, largest weight over mean
     brdf = model(*parameters, 0.77 + 6.08j)
     with torch.no_grad():
-        w = sampling_laws._Setting.of(brdf, math.radians(degrees)).draw(40_000, torch.Generator().manual_seed(0)).weight
+        w = laws.SamplingSetup.of(brdf, math.radians(degrees)).draw(40_000, torch.Generator().manual_seed(0)).weight
     assert w.var() / w.mean() ** 2 < variance
     assert w.max() / w.mean() < largest
 
@@ -165,7 +166,7 @@ def test_parts_can_be_left_out():
 
 def test_mirror_lobe_is_drawn_with_its_reflectance():
     brdf = model(0.02, 1.0, 0.5, 0.77 + 6.08j)
-    sample = sampling_laws._Setting.of(brdf, 0.8).draw(2000, torch.Generator().manual_seed(0))
+    sample = laws.SamplingSetup.of(brdf, 0.8).draw(2000, torch.Generator().manual_seed(0))
     mirrored = sample.pdf.isinf()
     share = float(mirrored.double().mean())
     assert 0.5 < share < 1

@@ -21,7 +21,7 @@ def held(x):
 def albedo(brdf, cos, nodes=48):
     """By quadrature through `forward`, channel 0."""
     with torch.no_grad():
-        return float(laws._directional_albedo(brdf, math.acos(cos), nodes)[0])
+        return float(laws.albedo_by_quadrature(brdf, math.acos(cos), nodes)[0])
 
 
 def few(n=200, max_angle=85.0):
