@@ -60,7 +60,7 @@ def every_other(dtype: torch.dtype) -> BRDF:
     return brushed(total, dtype)
 
 
-# An exponent of some tens multiplies the rounding of what it is taken of. The largest error of 20,000 directions was 4e-5.
+# An exponent of some tens multiplies the rounding of what it is taken of: 4e-5 in the worst of 20,000 directions.
 STEEP_LOBE = 2e-4
 # A power of 8 or 20 of a length: 7e-7, and 4e-6 where nothing diffuse covers the tail.
 POWER = 1e-5
