@@ -170,6 +170,13 @@ def safe_power(base: Tensor, exponent: Tensor) -> Tensor:
     return torch.where(empty, (exponent == 0).to(value), value)
 
 
+def power_of_complement(deficit: Tensor, exponent: Tensor) -> Tensor:
+    """(1 - deficit)^exponent for 0 <= deficit < 1, with all digits of a small deficit; beyond as `safe_power`."""
+    empty = deficit >= 1
+    value = (exponent * torch.log1p(-deficit.masked_fill(empty, 0.0))).exp()
+    return torch.where(empty, (exponent == 0).to(value), value)
+
+
 def log_cosine_over_sine_squared(cosine: Tensor, sine_squared: Tensor) -> Tensor:
     """log(cos)/sin^2 for cos > 0: -1/2 at 0, without loss of digits there."""
     steep = sine_squared < 0.5

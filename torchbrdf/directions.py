@@ -14,6 +14,7 @@ from torchbrdf._numerics import (
     dot,
     holds,
     horizon,
+    length,
     safe_divide,
     safe_sqrt,
     unit_tolerance,
@@ -108,6 +109,22 @@ class Cosines:
     def zero_below_horizon(self, brdf: Tensor) -> Tensor:
         """brdf (..., channel) where light and view are above the horizon, else 0 with zero gradient."""
         return brdf.masked_fill(~self.above_horizon[..., None], 0.0)
+
+    @_computed_once
+    def half_phase(self) -> tuple[Tensor, Tensor]:
+        """Sine and cosine of half the angle g between light and view, each (...); zero subgradient where 0. [-]
+
+        |light - view|/2 and |light + view|/2 where the vectors are known: all digits, also of a small angle. The dot
+        product alone has lost half of them.
+        """
+        if self.vectors is None:
+            return safe_sqrt((1 - self.phase) / 2), safe_sqrt((1 + self.phase) / 2)
+        _, light, view = self.vectors
+        below = ~self.above_horizon
+        return (
+            (length(light - view) / 2).masked_fill(below, 0.0),
+            (length(light + view) / 2).masked_fill(below, 1.0),
+        )
 
     @_computed_once
     def tangent_plane(self) -> TangentPlane:

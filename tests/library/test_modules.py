@@ -142,11 +142,19 @@ def test_others_compile(backend):
 
 
 IN_ONE_GRAPH_OF_ANY_SHAPE = ("lambert", "hapke")  # a bounded and an unbounded domain; the others by hand
+IN_SEVERAL = pytest.mark.xfail(strict=True, reason="the modes of all bounces are looked up by numbers")
+
+
+def marks(model):
+    if model.name in IN_ONE_GRAPH_OF_ANY_SHAPE:
+        return ()
+    several = model.name in ("rough surface, white, all bounces", "grooves, white, all bounces")
+    return (pytest.mark.slow, IN_SEVERAL) if several else (pytest.mark.slow,)
 
 
 @pytest.mark.parametrize(
     "model",
-    [pytest.param(m, marks=() if m.name in IN_ONE_GRAPH_OF_ANY_SHAPE else pytest.mark.slow) for m in MODELS],
+    [pytest.param(m, marks=marks(m)) for m in MODELS],
     ids=lambda m: m.name,
 )
 def test_captured_in_one_graph_of_any_shape(model):

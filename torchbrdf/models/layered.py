@@ -119,17 +119,22 @@ class Coupled(_Polished):
 
 @final
 class Dampened(_Polished):
-    r"""A matte body seen through a smooth interface that dims it on the way out only: not reciprocal.
+    r"""A matte body that gets what a smooth interface does not reflect; nothing is lost on the way out.
 
-    .. math:: f_r = F\text{-mirror} + \frac{\rho}{\pi} (1 - F_r)
+    .. math:: f_r = F\text{-mirror} + \frac{\rho}{\pi} (1 - F_i)
+
+    F_i is that of the light: "for each incident theta" the mirror and the matte part together return F + rho (1 - F)
+    of what arrives, at most all of it. With F of the view, the other reading, they would return more than arrives at
+    grazing light.
 
     Args:
         albedo: rho of the body, scalar, (channel,) or (..., channel). [-] in [0, 1]
         fresnel: Schlick (0.04) if not given.
     Components: matte. The mirror lobe is sampled, not evaluated: see `Mirror`.
-    Deviations: not reciprocal: F is that of the view. `Coupled` is the model to use. With Schlick's F photographs show
-        rho (1 - f0) alone.
-    Source: Shirley & Marschner 2009, Fundamentals of Computer Graphics, 3rd edition, ch. 25, smooth-layered model.
+    Deviations: not reciprocal, since F is that of the light alone. `Coupled` is the model to use. With Schlick's F
+        photographs show rho (1 - f0) alone.
+    Source: Shirley & Marschner 2009, Fundamentals of Computer Graphics, 3rd edition, ch. 25, smooth-layered model;
+        eq. (25.1) for what theta is.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -143,9 +148,9 @@ class Dampened(_Polished):
         return self.albedo
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
-        return {"matte": torch.atleast_1d(self.albedo) / math.pi * (1 - self.fresnel(cosines.view))}
+        return {"matte": torch.atleast_1d(self.albedo) / math.pi * (1 - self.fresnel(cosines.light))}
 
     def directional_albedo(self, cos_view: Tensor, *, nodes: int = 32) -> Tensor:
-        """F + rho (1 - F), in closed form; `nodes` is not used."""
-        mirror = self.fresnel(cos_view)
-        return mirror + torch.atleast_1d(self.albedo) * (1 - mirror)
+        """F + rho (1 - mean F), in closed form: what a view sees under uniform light, which may be more than that light
+        (not reciprocal); `nodes` is not used."""
+        return self.fresnel(cos_view) + torch.atleast_1d(self.albedo) * (1 - self.fresnel.average())

@@ -165,12 +165,12 @@ class Hapke(BRDF):
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         w, b = torch.atleast_1d(self.albedo), self.asymmetry[..., None]
-        c = cosines.phase[..., None]
-        away = safe_sqrt(1 - c)
-        toward = safe_sqrt(1 + c)
+        away, toward = (half[..., None] for half in cosines.half_phase)
         h = self.surge_width[..., None]
         opposition = self.surge[..., None] * safe_divide(h * toward, h * toward + away, where=h * toward + away > 0)
-        phase = (1 - b * b) * safe_power(1 + 2 * b * c + b * b, torch.full_like(b, -1.5))
+        # 1 + 2 b cos(g) + b^2 as a sum of squares, which keeps its digits in the peak of a narrow lobe
+        squared = torch.where(b < 0, (1 + b) ** 2 - 4 * b * away * away, (1 - b) ** 2 + 4 * b * toward * toward)
+        phase = (1 - b * b) * safe_power(squared, torch.full_like(b, -1.5))
         absorbed = safe_sqrt(1 - w)
         h_light, h_view = (
             (1 + 2 * m) / (1 + 2 * m * absorbed) for m in (cosines.light[..., None], cosines.view[..., None])

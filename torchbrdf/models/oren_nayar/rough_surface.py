@@ -100,7 +100,9 @@ class RoughSurface(SharedSlopes):
         order 5, most at retro-reflection from steep slopes. Three and more bounces at rho = 1 err by 1e-5 of the whole
         (sigma = 0.3) to 1.5e-3 (sigma = 1) at 4 modes, 1e-7 to 5e-5 at 12. The light returned at rho = 1 exceeds 1 by
         3e-3 at order 4 for sigma = 0.9, by 1e-4 at order 16. Below the node spacing some weights are negative (to
-        -0.8): the sum is accurate, the weights are no distribution; sample slopes with `sample_slope`. Kinks: at
+        -0.8): the sum is accurate, the weights are no distribution; sample slopes with `sample_slope`. Beyond 85 deg
+        such a sum may turn negative: sigma = 0.01 at 89.9, 89.9, 180 deg gives -0.107 /sr at the default nodes, where
+        the integral is 0.0265. Kinks: at
         light = view the zero subgradient is chosen; fractional powers where tan(theta) tan(theta_k) = 1.
     Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
         (1995, DOI 10.1007/BF01679684), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
