@@ -10,16 +10,15 @@ Conventions, stated once:
 - Below the horizon f_r is 0 with zero gradient.
 """
 
-from torchbrdf.brdf import BRDF
+import warnings
+
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import (
     Cosines,
     any_tangent,
 )
 from torchbrdf.effects import (
     EFFECTS,
-    Option,
-    compact,
-    options,
     simulated,
 )
 from torchbrdf.facets import (
@@ -234,7 +233,6 @@ __all__ = [  # noqa: RUF022 - in plain order
     "any_tangent",
     "burley",
     "coherency",
-    "compact",
     "conductor",
     "conductor_amplitudes",
     "dielectric",
@@ -250,7 +248,6 @@ __all__ = [  # noqa: RUF022 - in plain order
     "is_per_texel",
     "lambert_sphere_fast",
     "minnaert",
-    "options",
     "oren_nayar",
     "phong_radiance",
     "polarised_specular_reflectivity",
@@ -272,3 +269,11 @@ __all__ = [  # noqa: RUF022 - in plain order
     "v_cavities",
     "v_cavity_masking",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """Names of version 0.1, for one more version."""
+    if name != "options":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn("torchbrdf.options(model) is now model.stand_ins()", DeprecationWarning, stacklevel=2)
+    return lambda model: model.stand_ins()

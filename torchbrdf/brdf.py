@@ -2,7 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import torch
@@ -92,6 +93,16 @@ class BRDF(Sampled, Parametric, ABC):
             cosines = Cosines.from_products(cos_light, cos_view, phase)
         return (self.evaluate(cosines) * weight[..., None]).sum((0, 1))
 
+    def stand_ins(self) -> "dict[str, list[Option]]":
+        """What could be left out of this model, and by which cheaper model: none, unless a model says so.
+
+        By group: an option of a group replaces another of the same, and options of different groups add up. Of each
+        group the cheapest comes first; groups that drop parts of a sum come last. `torchbrdf.effects` holds names of
+        effects, and a model may add its own. Whether anything may be left out of a scene is measured there
+        (`inverse.plan`), what it costs and errs by in `torchbrdf.accuracy`.
+        """
+        return {}
+
     def __mul__(self, weight: Tensor | float) -> "WeightedSum":
         from torchbrdf.mixture import WeightedSum  # deferred: a sum is a BRDF
 
@@ -105,6 +116,23 @@ class BRDF(Sampled, Parametric, ABC):
     def __radd__(self, other: object) -> "BRDF":
         # sum([a, b]) starts from 0
         return self if other == 0 else NotImplemented
+
+
+@dataclass(frozen=True)
+class Option:
+    """A material that simulates less than a given one.
+
+    Attributes:
+        choice: what is simulated instead.
+        skips: the effects left out.
+        model: the whole material with the stand-in in it; values, and what is held fixed, are the given model's.
+        renamed: of parameters of `model` by path ("parts.0.sigma"), the path in the given model where it differs.
+    """
+
+    choice: str
+    skips: tuple[str, ...]
+    model: BRDF
+    renamed: Mapping[str, str] = field(default_factory=dict)
 
 
 def total(values: Iterable[Tensor]) -> Tensor:

@@ -214,6 +214,15 @@ def trainable(module: nn.Module) -> dict[str, tuple[str, Interval | Simplex]]:
     return found
 
 
+def paths(module: nn.Module) -> list[str]:
+    """Readable paths ("parts.0.sigma") of the declared parameters of a module and its children, trained or held."""
+    return [
+        f"{prefix}.{entry.name}" if prefix else entry.name
+        for prefix, child in module.named_modules()
+        for entry in declared(child)
+    ]
+
+
 def kept(module: Parametric, name: str) -> Tensor | fixed:
     """A parameter's value for another module of the same material: held fixed where the given module holds it."""
     value = getattr(module, name).detach()

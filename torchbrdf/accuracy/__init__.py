@@ -11,6 +11,7 @@ from torchbrdf.accuracy.ladders import (
     ladder,
     reference,
     relative_errors,
+    rungs_of,
 )
 from torchbrdf.accuracy.series import (
     SeriesLadder,
@@ -33,5 +34,6 @@ __all__ = [
     "ladder",
     "reference",
     "relative_errors",
+    "rungs_of",
     "series_ladder",
 ]

@@ -15,7 +15,7 @@ from torch import Tensor
 
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.fresnel import conductor
-from torchbrdf.models.he_torrance.lobe import Geometry, diffracted
+from torchbrdf.models.he_torrance.lobe import Geometry, diffracted, from_facets
 from torchbrdf.quadrature import gauss_legendre
 
 # As many radial nodes as azimuths on each side of the plane across; see `lobe_albedo` for the errors.
@@ -38,10 +38,12 @@ def lobe_albedo(
     eta: Tensor,
     k: Tensor,
     nodes: int = NODES,
+    wave_optics: bool = True,
 ) -> Tensor:
     """Share of light from `cos_view` (...) in (0, 1] that the diffracted lobe returns (..., channel). [-]
 
-    `nodes` radii times 2 `nodes` azimuths. sigma0, tau scalar or (...); wavelength, eta, k as `he_torrance`.
+    `nodes` radii times 2 `nodes` azimuths. sigma0, tau scalar or (...); wavelength, eta, k as `he_torrance`. Without
+    `wave_optics` the lobe is that of facets.
     """
     c = cos_view[..., None]
     s = safe_sqrt((1 - c) * (1 + c))
@@ -54,7 +56,7 @@ def lobe_albedo(
     along = s * ray.cos
     root = (c * c + along * along).sqrt()
     reach = torch.where(along > 0, c * c / (along.abs() + root), along.abs() + root)
-    width = _width(c, sigma0, tau, wavelength)
+    width = _width(c, sigma0, tau, wavelength) if wave_optics else 4 * sigma0 * c / tau
     a = torch.asinh(reach / width)
     w = x * (2 - x)
     p = width * torch.sinh(a * w)
@@ -66,7 +68,8 @@ def lobe_albedo(
     sin_light = safe_sqrt(s * s + 2 * along * p + planar)
     geometry = Geometry(cos_light, sin_light, c, s, planar, planar + up * up)
     fresnel = conductor(geometry.local_cos, eta=torch.atleast_1d(eta), k=torch.atleast_1d(k))
-    f = fresnel * diffracted(geometry, sigma0=sigma0, tau=tau, wavelength=wavelength)
+    lobe = diffracted if wave_optics else from_facets
+    f = fresnel * lobe(geometry, sigma0=sigma0, tau=tau, wavelength=wavelength)
     area = p * (width * torch.cosh(a * w) * a * 2 * (1 - x))
     return (f * (area * weight * ray.weight)).sum((0, 1))
 

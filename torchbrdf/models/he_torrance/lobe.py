@@ -13,7 +13,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import cross, dot, safe_sqrt
+from torchbrdf._numerics import cross, dot, safe_divide, safe_sqrt
 from torchbrdf.directions import Cosines
 from torchbrdf.facets import HalfVector
 from torchbrdf.models.he_torrance.roughness import effective_roughness
@@ -82,6 +82,33 @@ def diffracted(geometry: Geometry, *, sigma0: Tensor, tau: Tensor, wavelength: T
     g, t = torch.broadcast_tensors(phase * phase, spread * spread * geometry.planar)
     strength = math.pi**2 / wavelength * sigma * (tau / wavelength) * geometry.squared
     return strength * strength * series_over_g(g, t) * light.over_cos * view.over_cos / math.pi
+
+
+def from_facets(geometry: Geometry, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
+    r"""`diffracted` in the limit of geometric optics, g -> infinity (..., channel): mirror facets. [1/sr]
+
+    .. math::
+        \frac{1}{\pi} \Big(\frac{\tau |h|^2}{4 \sigma h_z^2}\Big)^2 e^{-(\tau/2\sigma)^2 |h_{xy}|^2/h_z^2}\,
+        \frac{S_1(\theta_i)}{c_i} \frac{S_1(\theta_r)}{c_r}
+
+    Beckmann's distribution of width 2 sigma/tau, from S(g, t) -> exp(-t/g)/g; the error is that of the first term left
+    out, (1 - 2 t/g + (t/g)^2/2)/g. Of the wavelength only the shape is read. 0 for a surface without height.
+    """
+    light = shadowing(geometry.cos_light, geometry.sin_light, sigma0=sigma0, tau=tau)
+    view = shadowing(geometry.cos_view, geometry.sin_view, sigma0=sigma0, tau=tau)
+    height = 2 * sigma0 * effective_roughness(light.k + view.k) * (geometry.cos_light + geometry.cos_view)
+    steepness = safe_divide(tau.expand_as(height), height, where=height > 0)  # of facets of slope 1, over their spread
+    up = geometry.cos_light + geometry.cos_view
+    strength = safe_divide(steepness * geometry.squared, 2 * up, where=(up > 0).expand_as(steepness))
+    f = (
+        strength
+        * strength
+        * (-steepness * steepness * geometry.planar).exp()
+        * light.over_cos
+        * view.over_cos
+        / math.pi
+    )
+    return f + torch.zeros_like(wavelength)
 
 
 def coherent(cos: Tensor, sin: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:

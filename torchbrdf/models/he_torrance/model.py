@@ -1,5 +1,6 @@
 """The He-Torrance model as a module: parameters, parts, energy and sampling."""
 
+import copy
 import math
 import warnings
 from typing import final
@@ -8,8 +9,9 @@ import torch
 from torch import Tensor
 
 from torchbrdf._numerics import holds, safe_divide
-from torchbrdf.brdf import BRDF
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import Cosines
+from torchbrdf.effects import DIRECTIONAL_DIFFUSE, SPECULAR, UNIFORM_DIFFUSE, WAVE_OPTICS
 from torchbrdf.fresnel import RELATIVE_INDEX
 from torchbrdf.models.he_torrance.energy import NODES, lobe_albedo
 from torchbrdf.models.he_torrance.reflectance import (
@@ -38,6 +40,7 @@ _STEEPEST_BOUND = math.radians(85)
 _BOUND_ANGLES = 24
 # Of the draws of the lobe, those from the cosine: they bound the weights where the lobe is drawn too seldom.
 _COSINE_SHARE = 0.1
+_EFFECT_OF = {"specular": SPECULAR, "directional_diffuse": DIRECTIONAL_DIFFUSE, "uniform_diffuse": UNIFORM_DIFFUSE}
 # Correlation lengths in wavelengths that only a mistake of units makes likely.
 _PLAUSIBLE = (0.05, 2000.0)
 
@@ -59,11 +62,16 @@ class HeTorrance(BRDF):
         solid_angle: of source and detector, one cone each. [sr] None keeps the specular part a delta lobe: sampled,
             in `directional_albedo`, not in f_r. A number adds its average over the cones to f_r.
         specular, directional_diffuse, uniform_diffuse: include the part of this name.
+        wave_optics: False takes the directional-diffuse part in its limit of geometric optics, facets of which sigma0
+            and tau give one width: hold them in a fit. For sigma0 > 0.
     Components: specular (0 where it is a delta lobe), directional_diffuse, uniform_diffuse (those included).
     Raises: ValueError outside the domains, for numbers of channels that differ, when all parts are switched off.
     Warns: UserWarning, at construction, when a exceeds `energy_bound` (parameters per pixel are not looked at), or
         when tau is so far from the wavelength that their units seem to differ.
     Deviations: as `he_torrance`; the first-surface parts themselves reach 1.022 at grazing (perfect reflector).
+        Without wave optics f_r cos is off, in the plane of incidence and for sigma0/tau from 0.05 to 0.2, by up to
+        0.65 % of its peak at normal incidence, 3.9 % at 60 degrees and 35 % at 80 for sigma0 = 1 wavelength; by up to
+        0.43 % at 60 degrees for 3 wavelengths and 0.039 % for 10: as 1/g.
     Source: He, Torrance, Sillion & Greenberg 1991.
     """
 
@@ -89,6 +97,7 @@ class HeTorrance(BRDF):
         specular: bool = True,
         directional_diffuse: bool = True,
         uniform_diffuse: bool = True,
+        wave_optics: bool = True,
     ):
         super().__init__()
         if not (specular or directional_diffuse or uniform_diffuse):
@@ -100,27 +109,55 @@ class HeTorrance(BRDF):
         self.k = nothing if k is None else k
         self.diffuse = nothing if diffuse is None else diffuse
         self.solid_angle = solid_angle
-        self._specular, self._lobe, self._matte = specular, directional_diffuse, uniform_diffuse
+        included = (specular, directional_diffuse, uniform_diffuse)
+        self.parts = tuple(name for name, there in zip(self.PARTS, included, strict=True) if there)
+        self.wave_optics = wave_optics
+        if not wave_optics and bool((self.sigma0 == 0).any()):
+            raise ValueError(
+                "HeTorrance.wave_optics=False needs sigma0 above 0: a surface without height has no facets."
+            )
         check_channels("HeTorrance", wavelength=self.wavelength, eta=self.eta, k=self.k, diffuse=self.diffuse)
         self._warn_of_units()
         if not is_per_texel(self):
             self._warn_of_energy()
 
     @property
-    def parts(self) -> tuple[str, ...]:
-        """Names of the parts included."""
-        included = (self._specular, self._lobe, self._matte)
-        return tuple(name for name, there in zip(self.PARTS, included, strict=True) if there)
+    def _specular(self) -> bool:
+        return "specular" in self.parts
+
+    @property
+    def _lobe(self) -> bool:
+        return "directional_diffuse" in self.parts
+
+    @property
+    def _matte(self) -> bool:
+        return "uniform_diffuse" in self.parts
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         found = {}
         if self._specular:
             found["specular"] = self._spike(cosines)
         if self._lobe:
-            found["directional_diffuse"] = directional_diffuse(cosines, **self._surface())
+            found["directional_diffuse"] = directional_diffuse(cosines, **self._surface(), wave_optics=self.wave_optics)
         if self._matte:
             found["uniform_diffuse"] = uniform_diffuse(cosines.light[..., None], self.diffuse)
         return found
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        """Facets instead of waves, whose lengths are held, and the same surface without one of its parts."""
+        groups: dict[str, list[Option]] = {}
+        if self._lobe and self.wave_optics and bool((self.sigma0 > 0).all()):
+            facets = copy.deepcopy(self)
+            facets.wave_optics = False
+            for name, length in self._lengths().items():
+                setattr(facets, name, fixed(length.detach()))
+            groups[WAVE_OPTICS] = [Option("facets; sigma0 and tau, now one width, are held", (WAVE_OPTICS,), facets)]
+        for part in self.parts if len(self.parts) > 1 else ():
+            without = copy.deepcopy(self)
+            without.parts = tuple(name for name in self.parts if name != part)
+            effect = _EFFECT_OF[part]
+            groups[effect] = [Option(f"no {effect} part", (effect,), without)]
+        return groups
 
     def specular_reflectivity(self, cos: Tensor) -> Tensor:
         """Reflectance (..., channel) of the specular part at a cosine of incidence (...); see the function. [-]"""
@@ -228,7 +265,7 @@ class HeTorrance(BRDF):
         elif self._specular and self.solid_angle is not None:
             total = total + spike_albedo(cos, solid_angle=self.solid_angle, nodes=nodes, **self._surface())
         if self._lobe:
-            total = total + lobe_albedo(cos, nodes=nodes, **self._surface())
+            total = total + lobe_albedo(cos, nodes=nodes, **self._surface(), wave_optics=self.wave_optics)
         return total
 
     def _dark(self, like: Tensor) -> Tensor:

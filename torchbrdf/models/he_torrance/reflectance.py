@@ -8,7 +8,7 @@ from torch import Tensor
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
 from torchbrdf.fresnel import RELATIVE_INDEX, conductor
-from torchbrdf.models.he_torrance.lobe import Geometry, coherent, diffracted
+from torchbrdf.models.he_torrance.lobe import Geometry, coherent, diffracted, from_facets
 from torchbrdf.parameters import ABSORPTION_INDEX, ALBEDO, Interval
 
 # A length that is divided by. Far below any in a sensible unit, far above what squares to 0 in float32.
@@ -78,13 +78,23 @@ def he_torrance(
 
 
 def directional_diffuse(
-    cosines: Cosines, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor, eta: Tensor, k: Tensor
+    cosines: Cosines,
+    *,
+    sigma0: Tensor,
+    tau: Tensor,
+    wavelength: Tensor,
+    eta: Tensor,
+    k: Tensor,
+    wave_optics: bool = True,
 ) -> Tensor:
-    """The diffracted lobe of `he_torrance` (..., channel), unchecked, arbitrary below the horizon. [1/sr]"""
+    """The diffracted lobe of `he_torrance` (..., channel), unchecked, arbitrary below the horizon. [1/sr]
+
+    Without `wave_optics` in the limit of geometric optics, see `from_facets`.
+    """
     geometry = Geometry.of(cosines)
     fresnel = conductor(geometry.local_cos, eta=torch.atleast_1d(eta), k=torch.atleast_1d(k))
     lengths = {"sigma0": sigma0[..., None], "tau": tau[..., None], "wavelength": torch.atleast_1d(wavelength)}
-    return fresnel * diffracted(geometry, **lengths)
+    return fresnel * (diffracted if wave_optics else from_facets)(geometry, **lengths)
 
 
 def uniform_diffuse(like: Tensor, diffuse: Tensor) -> Tensor:
