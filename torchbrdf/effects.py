@@ -35,8 +35,8 @@ class EffectOfPart(str):
         name.kind = effect.kind if isinstance(effect, EffectOfPart) else effect
         return name
 
-    def __getnewargs__(self) -> tuple[str, str]:  # for copies
-        return self._given
+    def __reduce__(self) -> tuple[type["EffectOfPart"], tuple[str, str]]:  # for copies
+        return EffectOfPart, self._given
 
 
 def simulated(model: BRDF, *, by_part: bool = True) -> tuple[str, ...]:
