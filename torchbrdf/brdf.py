@@ -11,7 +11,7 @@ from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
 from torchbrdf._numerics import safe_sqrt
-from torchbrdf.directions import Cosines
+from torchbrdf.directions import Cosines, any_tangent, orthonormal_tangent
 from torchbrdf.parameters import Parametric
 from torchbrdf.sampling import Sampled
 
@@ -25,7 +25,12 @@ class BRDF(Sampled, Parametric, ABC):
     Subclasses implement `evaluate_components`, and `propose` with `density` where the sampling of `Sampled` is not
     good enough. Sums and multiples are BRDFs again:
     `0.7 * OrenNayar() + 0.3 * Lambert()` has two trainable weights.
+
+    Attributes:
+        anisotropic: whether reflectance depends on a direction along the surface, the tangent, which is then needed.
     """
+
+    anisotropic: bool = False
 
     def forward(
         self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
@@ -43,8 +48,22 @@ class BRDF(Sampled, Parametric, ABC):
     ) -> Cosines:
         """What the model reads of the directions; raises ValueError where it misses a tangent."""
         if self.anisotropic and tangent is None:
-            raise ValueError(self.missing_tangent())
+            raise ValueError(self._missing_tangent())
         return Cosines.of(normal, light, view, tangent=tangent, normalize=normalize)
+
+    def tangent_of(self, normal: Tensor, tangent: Tensor | None) -> Tensor:
+        """Unit tangent (..., 3) across the normal: the given one's, or any for a model to which all are alike.
+
+        Raises ValueError where an anisotropic model misses a tangent.
+        """
+        if tangent is not None:
+            return orthonormal_tangent(normal, tangent)
+        if self.anisotropic:
+            raise ValueError(self._missing_tangent())
+        return any_tangent(normal)
+
+    def _missing_tangent(self) -> str:
+        return f"{type(self).__name__} is anisotropic and needs a tangent: pass tangent=... (..., 3)."
 
     def components(
         self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
