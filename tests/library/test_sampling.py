@@ -18,9 +18,9 @@ from torchbrdf import (
     Schlick,
     TorranceSparrow,
     fixed,
-    sampling_laws,
 )
 from torchbrdf import testing as laws
+from torchbrdf.testing import sampling as sampling_laws
 
 ANGLES = [math.radians(60), math.radians(85)]
 # One run in a thousand raises a false alarm: shared between the tests of all models and angles (Bonferroni).

@@ -32,8 +32,8 @@ from torchbrdf import (
     UnidirectionalVCavities,
     fixed,
     gaussian_weights,
-    sampling_laws,
 )
+from torchbrdf.testing import sampling as sampling_laws
 
 
 def seeded(seed=0):

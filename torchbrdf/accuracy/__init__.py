@@ -14,6 +14,7 @@ from torchbrdf.accuracy.ladders import (
     rungs_of,
 )
 from torchbrdf.accuracy.series import (
+    SCHEMES,
     SeriesLadder,
     SeriesRow,
     expanded,
@@ -22,6 +23,7 @@ from torchbrdf.accuracy.series import (
 
 __all__ = [
     "RUNGS",
+    "SCHEMES",
     "Ladder",
     "Row",
     "Rung",
