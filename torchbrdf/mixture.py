@@ -46,12 +46,12 @@ class WeightedSum(BRDF):
         self.weights = fixed(torch.stack(values)) if held else torch.stack(values)
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
-        found: dict[str, Tensor] = {}
+        components: dict[str, Tensor] = {}
         for position, (part, weight) in enumerate(zip(self.parts, self.weights, strict=True)):
             for name, value in part.evaluate_components(cosines).items():  # pyright: ignore[reportCallIssue]
                 label = f"{type(part).__name__}.{name}"
-                found[f"{label}#{position}" if label in found else label] = weight * value
-        return found
+                components[f"{label}#{position}" if label in components else label] = weight * value
+        return components
 
     @property
     def anisotropic(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -69,8 +69,8 @@ class WeightedSum(BRDF):
         return total([p * part.density(cosines) for part, p in zip(self._brdfs(), self._shares(), strict=True)])
 
     def delta_reflectance(self, cosines: Cosines) -> Tensor | None:
-        found = [(w, part.delta_reflectance(cosines)) for part, w in zip(self._brdfs(), self.weights, strict=True)]
-        mirrors = [w * r for w, r in found if r is not None]
+        weighted = [(w, part.delta_reflectance(cosines)) for part, w in zip(self._brdfs(), self.weights, strict=True)]
+        mirrors = [w * r for w, r in weighted if r is not None]
         return total(mirrors) if mirrors else None
 
     def delta_probability(self, cosines: Cosines) -> Tensor:

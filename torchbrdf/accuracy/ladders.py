@@ -225,7 +225,7 @@ def cost(
     # all rungs share the code of `evaluate`: with and without gradients, each needs its own compilation
     with torch._dynamo.config.patch(recompile_limit=4 * len(rungs)) if compiled else nullcontext():  # pyright: ignore
         seconds = [interleaved_medians(calls, repeats) for calls in (forward, backward)]
-    unit = [found[rungs[0].name] for found in seconds]
+    unit = [medians[rungs[0].name] for medians in seconds]
     return {
         rung.name: (seconds[0][rung.name] / unit[0], seconds[1][rung.name] / unit[1], saved[rung.name])
         for rung in rungs
@@ -251,7 +251,7 @@ def forward_ratios(models: Mapping[str, BRDF], cosines: Cosines, *, repeats: int
     with torch.no_grad():
         seconds = interleaved_medians({name: (lambda m=m: call(m), 1) for name, m in models.items()}, repeats, clock)
     unit = next(iter(seconds.values()))
-    return {name: found / unit for name, found in seconds.items()}
+    return {name: second / unit for name, second in seconds.items()}
 
 
 def interleaved_medians(
@@ -269,7 +269,7 @@ def interleaved_medians(
             call()
             _wait()
             times[name].append((clock() - began) / count)
-    return {name: statistics.median(found) for name, found in times.items()}
+    return {name: statistics.median(taken) for name, taken in times.items()}
 
 
 def _wait() -> None:

@@ -62,9 +62,9 @@ class Oriented(BRDF):
 
     def stand_ins(self) -> dict[str, list[Option]]:
         """Those of the material, turned the same way; bare where they have no grain."""
-        return {group: [self._turned(option) for option in options] for group, options in self.brdf.stand_ins().items()}
+        return {group: [self._of(option) for option in options] for group, options in self.brdf.stand_ins().items()}
 
-    def _turned(self, option: Option) -> Option:
+    def _of(self, option: Option) -> Option:
         grain = option.model.anisotropic
         given = set(paths(self.brdf))
         renamed = {}

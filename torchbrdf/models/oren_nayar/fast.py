@@ -42,16 +42,16 @@ _PARTS: dict[Bounces, tuple[str, ...]] = {
 
 
 def _read(path: Path) -> _Fit:
-    found = json.loads(path.read_text())
+    numbers = json.loads(path.read_text())
     names = _PARTS["all"]
-    terms = {n: [(t["factor"], *t["powers"]) for t in found[n]] for n in names}
-    orders = {n: [t["order"] for t in found[n]] for n in names}
-    series = {n: [t["series"] for t in found[n]] for n in names}
+    terms = {n: [(t["factor"], *t["powers"]) for t in numbers[n]] for n in names}
+    orders = {n: [t["order"] for t in numbers[n]] for n in names}
+    series = {n: [t["series"] for t in numbers[n]] for n in names}
     rows = []
     for name in names:
         for order, row in zip(orders[name], series[name], strict=True):
             rows.append([*[0.0] * (len(row) * order), *row, *[0.0] * (len(row) * (2 - order))])
-    return _Fit(terms, orders, series, torch.tensor(rows, dtype=torch.float64), tuple(found["resonance"]))
+    return _Fit(terms, orders, series, torch.tensor(rows, dtype=torch.float64), tuple(numbers["resonance"]))
 
 
 _FIT = _read(Path(__file__).with_name("fast_rough_surface.json"))

@@ -64,7 +64,7 @@ class SharedSlopes(CltcSampled, ImageBRDF):
     def images(self, *coordinates: Tensor) -> Tensor:
         plane = SlopePlane(*coordinates)
         slopes = plane.dot.new_tensor(shared_slopes(self.nodes), dtype=torch.float64)
-        found = mean_images(
+        images = mean_images(
             plane,
             cos_slope=slopes.cos().to(plane.dot.dtype),
             tan_slope=slopes.tan().to(plane.dot.dtype),
@@ -73,7 +73,7 @@ class SharedSlopes(CltcSampled, ImageBRDF):
             graded=self.graded,
             modes=self._modes(plane.dot),
         )
-        return found.flat()
+        return images.flat()
 
     def component_coefficients(self) -> dict[str, Tensor]:
         weights = self.slope_weights()
@@ -150,19 +150,19 @@ class RoughSurface(SharedSlopes):
     def members(self) -> list[Member]:
         """The ladder up to this model: fewer bounces, and of each number fewer slopes."""
         material: dict[str, Any] = {name: kept(self, name) for name in ("albedo", "sigma")}
-        detail: dict[str, Any] = {"order": self.order, "graded": self.graded, "modes": self.modes}
+        settings: dict[str, Any] = {"order": self.order, "graded": self.graded, "modes": self.modes}
         one = self.bounces == 1
-        found = (OrenNayar(**material, interreflection=False) if one else FastRoughSurface(**material)).members()
+        members = (OrenNayar(**material, interreflection=False) if one else FastRoughSurface(**material)).members()
         for bounces, (label, extra) in _BOUNCES.items():
             simulates = (effects.ROUGHNESS, *extra, effects.C3_TERM, effects.EXACT_SLOPES)
             for nodes in (*(count for count in _COARSER if count < self.nodes), self.nodes):
                 own = nodes == self.nodes
-                model = RoughSurface(**material, **detail, nodes=nodes, bounces=bounces)
+                model = RoughSurface(**material, **settings, nodes=nodes, bounces=bounces)
                 names = (*simulates, effects.MANY_SLOPES) if own else simulates
-                found.append(Member(f"exact, K = {nodes}, {label}", names, model))
+                members.append(Member(f"exact, K = {nodes}, {label}", names, model))
             if bounces == self.bounces:
                 break
-        return [*found[:-1], found[-1]._replace(model=self)]
+        return [*members[:-1], members[-1]._replace(model=self)]
 
     def stand_ins(self) -> dict[str, list[Option]]:
         return stand_ins(self.members())
