@@ -10,6 +10,7 @@ Conventions, stated once:
 - Below the horizon f_r is 0 with zero gradient.
 """
 
+import importlib
 import warnings
 
 from torchbrdf.brdf import BRDF, Option
@@ -168,6 +169,8 @@ from torchbrdf.slopes import (
     tabulated_weights,
 )
 
+__version__ = "0.2.0"
+
 __all__ = [  # noqa: RUF022 - in plain order
     "ACRYLIC",
     "ALUMINIUM",
@@ -270,9 +273,14 @@ __all__ = [  # noqa: RUF022 - in plain order
     "v_cavity_masking",
 ]
 
+_MOVED = {"sampling_laws": "torchbrdf.testing", "accuracy_series": "torchbrdf.accuracy"}
+
 
 def __getattr__(name: str) -> object:
     """Names of version 0.1, for one more version."""
+    if name in _MOVED:
+        warnings.warn(f"torchbrdf.{name} is now part of {_MOVED[name]}", DeprecationWarning, stacklevel=2)
+        return importlib.import_module(_MOVED[name])
     if name != "options":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     warnings.warn("torchbrdf.options(model) is now model.stand_ins()", DeprecationWarning, stacklevel=2)
