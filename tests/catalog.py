@@ -228,7 +228,7 @@ OTHERS = [
             wavelength=fixed(torch.tensor([0.65, 0.5], dtype=dtype)),
             eta=fixed(torch.tensor([1.49, 0.77], dtype=dtype)),  # (1 + k^2)/eta reflects as much at normal incidence
             k=torch.tensor([7.82, 6.08], dtype=dtype),
-            diffuse=number(0.02, dtype),  # covers the far tail of the lobe, which float32 cannot hold
+            diffuse=number(0.02, dtype),  # covers the far tail of the other part, which float32 cannot hold
         ),
         nodes=96,
         float32=FACETS,
@@ -246,10 +246,10 @@ OTHERS = [
         float32=FACETS,
     ),
     Model(
-        "he_torrance, averaged spike",
+        "he_torrance, averaged specular part",
         lambda dtype: HeTorrance(
             sigma0=number(0.05, dtype),
-            tau=fixed(number(0.7, dtype)),  # the spike hardly knows it
+            tau=fixed(number(0.7, dtype)),  # the specular part hardly knows it
             wavelength=fixed(number(0.55, dtype)),
             eta=number(1.5, dtype),
             solid_angle=1.0,
@@ -257,9 +257,9 @@ OTHERS = [
             uniform_diffuse=False,
         ),
         nodes=96,
-        integral=1e-3,  # the kinks at apex and rim of the spike are no panel's end
+        integral=1e-3,  # the kinks at apex and rim of the specular part are no panel's end
         albedo_error=2e-2,
-        float32=2e-3,  # at the rim the spike is what two roots leave: relative to its apex all digits are right
+        float32=2e-3,  # at the rim it is what two roots leave: relative to its apex all digits are right
     ),
     Model(
         "tabulated",

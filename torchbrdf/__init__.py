@@ -10,16 +10,16 @@ Conventions, stated once:
 - Below the horizon f_r is 0 with zero gradient.
 """
 
-from torchbrdf.brdf import BRDF
+import importlib
+import warnings
+
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import (
     Cosines,
     any_tangent,
 )
 from torchbrdf.effects import (
     EFFECTS,
-    Option,
-    compact,
-    options,
     simulated,
 )
 from torchbrdf.facets import (
@@ -169,6 +169,8 @@ from torchbrdf.slopes import (
     tabulated_weights,
 )
 
+__version__ = "0.2.0"
+
 __all__ = [  # noqa: RUF022 - in plain order
     "ACRYLIC",
     "ALUMINIUM",
@@ -234,7 +236,6 @@ __all__ = [  # noqa: RUF022 - in plain order
     "any_tangent",
     "burley",
     "coherency",
-    "compact",
     "conductor",
     "conductor_amplitudes",
     "dielectric",
@@ -250,7 +251,6 @@ __all__ = [  # noqa: RUF022 - in plain order
     "is_per_texel",
     "lambert_sphere_fast",
     "minnaert",
-    "options",
     "oren_nayar",
     "phong_radiance",
     "polarised_specular_reflectivity",
@@ -272,3 +272,16 @@ __all__ = [  # noqa: RUF022 - in plain order
     "v_cavities",
     "v_cavity_masking",
 ]
+
+_MOVED = {"sampling_laws": "torchbrdf.testing", "accuracy_series": "torchbrdf.accuracy"}
+
+
+def __getattr__(name: str) -> object:
+    """Names of version 0.1, for one more version."""
+    if name in _MOVED:
+        warnings.warn(f"torchbrdf.{name} is now part of {_MOVED[name]}", DeprecationWarning, stacklevel=2)
+        return importlib.import_module(_MOVED[name])
+    if name != "options":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn("torchbrdf.options(model) is now model.stand_ins()", DeprecationWarning, stacklevel=2)
+    return lambda model: model.stand_ins()

@@ -94,8 +94,8 @@ class Cosines:
             for name, v in vectors.items():
                 _check_unit(name, v)
         n, s, v = vectors.values()
-        found = cls.from_products(dot(n, s), dot(n, v), dot(s, v))
-        return replace(found, vectors=(n, s, v), tangent=tangent)
+        cosines = cls.from_products(dot(n, s), dot(n, v), dot(s, v))
+        return replace(cosines, vectors=(n, s, v), tangent=tangent)
 
     @classmethod
     def from_products(cls, light: Tensor, view: Tensor, phase: Tensor) -> "Cosines":
@@ -228,14 +228,14 @@ def _check_shapes(vectors: dict[str, Tensor]) -> None:
         if v.ndim == 0 or v.shape[-1] != 3:
             raise ValueError(f"{name} must have shape (..., 3); found {tuple(v.shape)}.")
     if len({v.dtype for v in vectors.values()}) > 1:
-        found = ", ".join(f"{name} {v.dtype}" for name, v in vectors.items())
-        raise TypeError(f"{_listed(vectors)} must share one dtype; found {found}.")
+        dtypes = ", ".join(f"{name} {v.dtype}" for name, v in vectors.items())
+        raise TypeError(f"{_listed(vectors)} must share one dtype; found {dtypes}.")
     shapes = [v.shape for v in vectors.values()]
     try:
         torch.broadcast_shapes(*shapes)
     except RuntimeError:
-        found = ", ".join(f"{name} {tuple(v.shape)}" for name, v in vectors.items())
-        raise ValueError(f"{_listed(vectors)} must broadcast; found {found}.") from None
+        given = ", ".join(f"{name} {tuple(v.shape)}" for name, v in vectors.items())
+        raise ValueError(f"{_listed(vectors)} must broadcast; found {given}.") from None
 
 
 def _listed(vectors: dict[str, Tensor]) -> str:

@@ -170,10 +170,20 @@ class Fresnel(Parametric, ABC):
     def average(self) -> Tensor:
         """F under uniform light, the mean over 2 c dc (..., channel). [-]"""
 
+    def at_every_angle(self) -> "ConstantFresnel | None":
+        """Stand-in that reflects as at normal incidence; None where F is the same at every angle anyway."""
+        stored = next((t for t in (*self.parameters(), *self.buffers()) if t.is_floating_point()), torch.ones(()))
+        value = self(stored.new_ones(())).detach()
+        trained = any(p.requires_grad for p in self.parameters())
+        return ConstantFresnel(value=value if trained else fixed(value))
+
 
 @final
 class Perfect(Fresnel):
     """Reflects everything: F = 1."""
+
+    def at_every_angle(self) -> None:
+        return None
 
     def forward(self, cos: Tensor) -> Tensor:
         return torch.ones_like(cos)[..., None]
@@ -197,6 +207,9 @@ class ConstantFresnel(Fresnel):
 
     def average(self) -> Tensor:
         return torch.atleast_1d(self.value)
+
+    def at_every_angle(self) -> None:
+        return None
 
 
 @final

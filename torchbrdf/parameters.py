@@ -43,14 +43,14 @@ class Interval:
         if holds(inside):
             return
         finite = value[value.isfinite()]
-        found = f"min {finite.min():.6g}, max {finite.max():.6g}" if finite.numel() else "none is finite"
+        extent = f"min {finite.min():.6g}, max {finite.max():.6g}" if finite.numel() else "none is finite"
         opening = "(" if open_ends else "["
         closing = ")" if open_ends or math.isinf(self.high) else "]"
         unit = f" {self.unit}" if self.unit else ""
         remedy = " A trained value cannot sit on a bound: hold it there with fixed(...)." if open_ends else ""
         raise ValueError(
             f"{name} must lie in {opening}{self.low:.4g}, {self.high:.4g}{closing}{unit}; "
-            f"{int((~inside).sum())} of {inside.numel()} entries do not ({found}).{remedy}"
+            f"{int((~inside).sum())} of {inside.numel()} entries do not ({extent}).{remedy}"
         )
 
     def to_raw(self, value: Tensor) -> Tensor:
@@ -204,14 +204,23 @@ def declared(module: nn.Module) -> Iterator[Constrained]:
 
 def trainable(module: nn.Module) -> dict[str, tuple[str, Interval | Simplex]]:
     """Trained parameters of a module and its children: readable path -> (path of the raw one, domain)."""
-    found = {}
+    trained = {}
     for prefix, child in module.named_modules():
         dot = f"{prefix}." if prefix else ""
         for entry in declared(child):
             raw = child._parameters.get(f"raw_{entry.name}")
             if raw is not None and raw.requires_grad:
-                found[dot + entry.name] = (f"{dot}raw_{entry.name}", entry.domain)
-    return found
+                trained[dot + entry.name] = (f"{dot}raw_{entry.name}", entry.domain)
+    return trained
+
+
+def paths(module: nn.Module) -> list[str]:
+    """Readable paths ("parts.0.sigma") of the declared parameters of a module and its children, trained or held."""
+    return [
+        f"{prefix}.{entry.name}" if prefix else entry.name
+        for prefix, child in module.named_modules()
+        for entry in declared(child)
+    ]
 
 
 def kept(module: Parametric, name: str) -> Tensor | fixed:

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf import BRDF, Oriented
-from torchbrdf import testing as laws
+from torchbrdf.testing import laws
 
 
 class Weights(NamedTuple):

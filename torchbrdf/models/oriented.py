@@ -6,8 +6,9 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import BRDF
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import Cosines
+from torchbrdf.parameters import paths
 from torchbrdf.sampling import Sample
 
 
@@ -62,3 +63,18 @@ class Oriented(BRDF):
     def _grain(self, like: Tensor) -> Tensor:
         """The direction as a tangent beside other directions, whose dtype is theirs."""
         return self.direction.to(like.dtype)
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        """Those of the material, turned the same way; bare where they have no grain."""
+        return {group: [self._of(option) for option in options] for group, options in self.brdf.stand_ins().items()}
+
+    def _of(self, option: Option) -> Option:
+        grain = option.model.anisotropic
+        given = set(paths(self.brdf))
+        renamed = {}
+        for path in paths(option.model):
+            before = option.renamed.get(path, path)
+            if before in given and (path != before or not grain):
+                renamed[f"brdf.{path}" if grain else path] = f"brdf.{before}"
+        model = Oriented(option.model, self.direction) if grain else option.model
+        return replace(option, model=model, renamed=renamed)

@@ -1,15 +1,18 @@
 """Fujii's Oren-Nayar and its energy-preserving extension (FON and EON of Portsmouth, Kutz and Hill)."""
 
 import math
-from typing import final
+from typing import Any, final
 
 import torch
 from torch import Tensor
 
 from torchbrdf._numerics import angle_over_sine, safe_sqrt
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
+from torchbrdf.effects import INTERREFLECTION, ROUGHNESS
 from torchbrdf.linear import LinearBRDF
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
+from torchbrdf.models.rungs import Member, lambert, stand_ins
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed, kept
 from torchbrdf.sampling import CltcSampled
 
 # 1/2 - 2/(3 pi) and 2/3 - 28/(15 pi): the mean of the retro term at grazing, and over the hemisphere.
@@ -117,6 +120,13 @@ class FujiiOrenNayar(_RoughDiffuse):
         """rho (1 + r G/pi)/(1 + c1 r), in closed form; `nodes` is not used."""
         return torch.atleast_1d(self.albedo) * fon_albedo(cos_view[..., None], roughness=self.roughness[..., None])
 
+    def members(self) -> list[Member]:
+        """The ladder up to this model."""
+        return [lambert(self), Member("Fujii", (ROUGHNESS,), self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())
+
 
 @final
 class EON(_RoughDiffuse):
@@ -175,3 +185,11 @@ class EON(_RoughDiffuse):
     def _returned(self) -> Tensor:
         rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness[..., None])
         return rho * rho * average / (1 - rho * (1 - average))
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model."""
+        material: dict[str, Any] = {name: kept(self, name) for name in ("albedo", "roughness")}
+        return [*FujiiOrenNayar(**material).members(), Member("EON", (ROUGHNESS, INTERREFLECTION), self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())

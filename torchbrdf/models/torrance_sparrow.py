@@ -5,8 +5,9 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import BRDF
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import Cosines
+from torchbrdf.effects import FRESNEL_VARIATION
 from torchbrdf.facets import (
     HalfVector,
     slope_area,
@@ -17,7 +18,7 @@ from torchbrdf.facets import (
     visible_azimuth,
 )
 from torchbrdf.fresnel import Fresnel, Perfect
-from torchbrdf.parameters import ROUGHNESS, Constrained, fixed
+from torchbrdf.parameters import ROUGHNESS, Constrained, fixed, kept
 from torchbrdf.sampling import along_view, mirrored
 
 
@@ -102,3 +103,11 @@ class TorranceSparrow(BRDF):
         half = HalfVector.of(cosines)
         seen = (half.cos_light / (cosines.view * half.cos)).clamp(max=2.0)
         return slope_area(half, sigma=self.sigma) * seen / (4 * half.cos_light)
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        """The same facets with one reflectance at every angle."""
+        flat = self.fresnel.at_every_angle()
+        if flat is None:
+            return {}
+        stand_in = TorranceSparrow(sigma=kept(self, "sigma"), fresnel=flat, normalised=self.normalised)
+        return {FRESNEL_VARIATION: [Option("the reflectance of normal incidence", (FRESNEL_VARIATION,), stand_in)]}

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from torchbrdf import RoughSurface, fixed
-from torchbrdf import testing as laws
+from torchbrdf.testing import laws
 
 DOUBLE = torch.float64
 

@@ -23,7 +23,7 @@ from torch import Tensor
 from torchbrdf._numerics import cross, dot, horizon, safe_sqrt
 from torchbrdf.directions import Cosines, any_tangent, orthonormal_tangent
 from torchbrdf.fresnel import conductor_amplitudes, refracted_cosine
-from torchbrdf.models.he_torrance.lobe import Geometry, coherent, diffracted
+from torchbrdf.models.he_torrance.perfect_reflector import Geometry, directional_diffuse_of_waves, specular_share
 from torchbrdf.models.he_torrance.reflectance import check_surface
 
 
@@ -74,14 +74,14 @@ def he_torrance_polarised(
     cosines = Cosines.of(normal, light, view)
     geometry = Geometry.of(cosines)
     surface = {"sigma0": sigma0[..., None], "tau": tau[..., None], "wavelength": torch.atleast_1d(wavelength)}
-    base = diffracted(geometry, **surface)
+    base = directional_diffuse_of_waves(geometry, **surface)
     state = unpolarised(base) if incident is None else incident
     jones = jones_matrix(normal, light, view, geometry, eta=eta, k=k, tangent=tangent)
     received = state[..., None, :, :]
-    lobe = base[..., None, None] * (jones @ received @ jones.mH)
+    directed = base[..., None, None] * (jones @ received @ jones.mH)
     power = received.diagonal(dim1=-2, dim2=-1).sum(-1).real
-    matte = torch.atleast_1d(diffuse) / math.pi * power
-    total = lobe + matte[..., None, None] * unpolarised(base)
+    uniform = torch.atleast_1d(diffuse) / math.pi * power
+    total = directed + uniform[..., None, None] * unpolarised(base)
     return total.masked_fill(~cosines.above_horizon[..., None, None, None], 0.0)
 
 
@@ -102,7 +102,7 @@ def polarised_specular_reflectivity(
     """
     check_surface("polarised_specular_reflectivity", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
     c = cos[..., None]
-    share = coherent(
+    share = specular_share(
         c,
         safe_sqrt((1 - c) * (1 + c)),
         sigma0=sigma0[..., None],

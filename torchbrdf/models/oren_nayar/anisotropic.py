@@ -6,10 +6,13 @@ from typing import Literal, final
 import torch
 from torch import Tensor
 
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
+from torchbrdf.effects import ANISOTROPY
 from torchbrdf.linear import ImageBRDF
 from torchbrdf.models.oren_nayar.images import Bounces, cavity_images, flat_coefficients
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
+from torchbrdf.models.oren_nayar.rough_surface import RoughSurface
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed, kept
 from torchbrdf.quadrature import gauss_legendre
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
@@ -97,6 +100,15 @@ class AnisotropicRoughSurface(CltcSampled, ImageBRDF):
     def component_coefficients(self) -> dict[str, Tensor]:
         weights = anisotropic_weights(self.sigma_x, self.sigma_y, nodes=self.nodes, azimuths=self.azimuths)
         return flat_coefficients(weights, self.albedo, bounces=self._bounces)
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        """The isotropic surface of the mean variance."""
+        sigma = ((self.sigma_x.square() + self.sigma_y.square()) / 2).sqrt().detach()
+        held = all(isinstance(kept(self, name), fixed) for name in ("sigma_x", "sigma_y"))
+        stand_in = RoughSurface(
+            albedo=kept(self, "albedo"), sigma=fixed(sigma) if held else sigma, nodes=self.nodes, bounces=self.bounces
+        )
+        return {ANISOTROPY: [Option("one width in all azimuths", (ANISOTROPY,), stand_in)]}
 
 
 def slope_vectors(like: Tensor, *, nodes: int, azimuths: int) -> tuple[Tensor, Tensor, Tensor]:

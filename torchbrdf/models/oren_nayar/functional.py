@@ -1,15 +1,19 @@
 """Functional approximation of the integral of Oren & Nayar 1994, eqs. (27)-(29) of the long version."""
 
 import math
-from typing import final
+from typing import Any, final
 
 import torch
 from torch import Tensor
 
+from torchbrdf import effects
 from torchbrdf._numerics import positive_part
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
+from torchbrdf.models.rungs import Member, stand_ins
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
@@ -131,3 +135,15 @@ class OrenNayar(CltcSampled, LinearBRDF):
     def component_coefficients(self) -> dict[str, Tensor]:
         parts = {"direct": direct_coefficients, "interreflection": interreflection_coefficients}
         return {name: parts[name](self.albedo, self.sigma) for name, included in self._parts.items() if included}
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model, without interreflection where it has none."""
+        material: dict[str, Any] = {name: kept(self, name) for name in ("albedo", "sigma")}
+        bounce = self._parts["interreflection"]
+        plain = (effects.ROUGHNESS, effects.INTERREFLECTION) if bounce else (effects.ROUGHNESS,)
+        without = Member("functional without C3", plain, OrenNayar(**material, interreflection=bounce, c3=False))
+        own = Member("functional", (*plain, effects.C3_TERM), self) if self.c3 else without._replace(model=self)
+        return [*QualitativeOrenNayar(**material).members(), without, own]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members()) if self._parts["direct"] else {}

@@ -43,12 +43,12 @@ class Bounces(NamedTuple):
 
     def named(self, direct: Tensor, two_bounce: Tensor, higher: Tensor) -> dict[str, Tensor]:
         """The parts that are followed, by name."""
-        found = {"direct": direct}
+        parts = {"direct": direct}
         if self.two:
-            found["two_bounce"] = two_bounce
+            parts["two_bounce"] = two_bounce
         if self.modes:
-            found["higher"] = higher
-        return found
+            parts["higher"] = higher
+        return parts
 
 
 class Images(NamedTuple):
@@ -140,11 +140,11 @@ def flat_coefficients(
     if eigenvalues is not None:
         higher = (shares[..., None, None] * bounce_coefficients(eigenvalues, rho[..., 0])).flatten(-3)
         counts[2] = higher.shape[-1]
-    found = {}
+    padded = {}
     for position, (name, part) in enumerate(bounces.named(direct, two, higher).items()):
         before, after = sum(counts[:position]), sum(counts[position + 1 :])
-        found[name] = torch.nn.functional.pad(part, (before, after))
-    return found
+        padded[name] = torch.nn.functional.pad(part, (before, after))
+    return padded
 
 
 def added(images: Images, albedo: Tensor, *, bounces: Bounces, eigenvalues: Tensor | None = None) -> dict[str, Tensor]:

@@ -6,9 +6,12 @@ from typing import final
 import torch
 from torch import Tensor
 
+from torchbrdf import effects
 from torchbrdf._numerics import positive_part
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
+from torchbrdf.models.rungs import Member, lambert, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
@@ -93,3 +96,10 @@ class QualitativeOrenNayar(CltcSampled, LinearBRDF):
 
     def component_coefficients(self) -> dict[str, Tensor]:
         return {"direct": qualitative_coefficients(self.albedo, self.sigma, self.a_constant)}
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model."""
+        return [lambert(self), Member(f"qualitative ({self.a_constant:g})", (effects.ROUGHNESS,), self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())

@@ -1,22 +1,36 @@
 """The exact rough surface: V-cavities of many slopes, their azimuth mean, and the bounces between their facets."""
 
 from abc import abstractmethod
-from typing import Literal, final
+from typing import Any, Literal, final
 
 import torch
 from torch import Tensor
 
+from torchbrdf import effects
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import ImageBRDF
 from torchbrdf.models.oren_nayar.azimuth_paper import direct_mean_paper, two_bounce_mean_paper
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, modes_of
+from torchbrdf.models.oren_nayar.fast import FastRoughSurface
+from torchbrdf.models.oren_nayar.functional import OrenNayar
 from torchbrdf.models.oren_nayar.images import Bounces, flat_coefficients, mean_images
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane, slope_plane
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Simplex, fixed
+from torchbrdf.models.rungs import Member, stand_ins
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Simplex, fixed, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 from torchbrdf.slopes import gaussian_weights, shared_slopes
 
 BounceCount = Literal[1, 2, "all"]
+
+# The bounces that may be followed, and what each simulates besides roughness and C3.
+_BOUNCES: dict[BounceCount, tuple[str, tuple[str, ...]]] = {
+    1: ("1 bounce", ()),
+    2: ("2 bounces", (effects.INTERREFLECTION,)),
+    "all": ("all bounces", (effects.INTERREFLECTION, effects.LATER_BOUNCES)),
+}
+# Numbers of slopes from a coarse surface to one that is as good as any for most purposes.
+_COARSER = (4, 8, 16)
 
 
 class SharedSlopes(CltcSampled, ImageBRDF):
@@ -50,7 +64,7 @@ class SharedSlopes(CltcSampled, ImageBRDF):
     def images(self, *coordinates: Tensor) -> Tensor:
         plane = SlopePlane(*coordinates)
         slopes = plane.dot.new_tensor(shared_slopes(self.nodes), dtype=torch.float64)
-        found = mean_images(
+        images = mean_images(
             plane,
             cos_slope=slopes.cos().to(plane.dot.dtype),
             tan_slope=slopes.tan().to(plane.dot.dtype),
@@ -59,7 +73,7 @@ class SharedSlopes(CltcSampled, ImageBRDF):
             graded=self.graded,
             modes=self._modes(plane.dot),
         )
-        return found.flat()
+        return images.flat()
 
     def component_coefficients(self) -> dict[str, Tensor]:
         weights = self.slope_weights()
@@ -135,6 +149,26 @@ class RoughSurface(SharedSlopes):
 
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model: fewer bounces, and of each number fewer slopes."""
+        material: dict[str, Any] = {name: kept(self, name) for name in ("albedo", "sigma")}
+        settings: dict[str, Any] = {"order": self.order, "graded": self.graded, "modes": self.modes}
+        one = self.bounces == 1
+        members = (OrenNayar(**material, interreflection=False) if one else FastRoughSurface(**material)).members()
+        for bounces, (label, extra) in _BOUNCES.items():
+            simulates = (effects.ROUGHNESS, *extra, effects.C3_TERM, effects.EXACT_SLOPES)
+            for nodes in (*(count for count in _COARSER if count < self.nodes), self.nodes):
+                own = nodes == self.nodes
+                model = RoughSurface(**material, **settings, nodes=nodes, bounces=bounces)
+                names = (*simulates, effects.MANY_SLOPES) if own else simulates
+                members.append(Member(f"exact, K = {nodes}, {label}", names, model))
+            if bounces == self.bounces:
+                break
+        return [*members[:-1], members[-1]._replace(model=self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())
 
 
 @final
