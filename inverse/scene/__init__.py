@@ -15,10 +15,12 @@ from inverse.scene.lights import (
     Light,
     Point,
     SimplerLight,
+    StoredLight,
 )
 from inverse.scene.maps import from_depth, from_normals
 from inverse.scene.scene import Scene
 from inverse.scene.sensor import Sensor
+from inverse.scene.stored_lights import Rays, from_numbers
 from inverse.scene.surface import (
     TO_CAMERA,
     Surface,
@@ -47,14 +49,17 @@ __all__ = [
     "Footprints",
     "Light",
     "Point",
+    "Rays",
     "Scene",
     "Sensor",
     "SimplerLight",
+    "StoredLight",
     "Surface",
     "cuboid",
     "cylinder",
     "from_depth",
     "from_normals",
+    "from_numbers",
     "orthographic",
     "perspective",
     "pinhole",
