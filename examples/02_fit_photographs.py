@@ -22,7 +22,8 @@ def synthetic(folder: Path, size: int) -> Path:
     lights = [Distant(torch.tensor([x, y, 1.0])) for x, y in ((0, 0), (0.6, 0), (-0.5, 0.3), (0, -0.7), (0.3, 0.5))]
     scene = Scene(sphere(size, size), lights, Sensor(exposure=3.0, read_noise=0.005))
     clay = OrenNayar(albedo=torch.tensor([0.6, 0.5, 0.4]), sigma=sigma_from_degrees(15))
-    write_stack(folder, scene.sensor.expose(render(scene, clay), torch.Generator().manual_seed(0)).detach(), scene)
+    photographs = scene.sensor.expose(render(scene, clay), torch.Generator().manual_seed(0)).detach()
+    write_stack(folder, photographs, scene, overwrite=True)
     print("Photographs: synthetic, made by OrenNayar with sigma = 15 deg.")
     return folder
 
@@ -38,7 +39,7 @@ def main() -> None:
     real = GRAY_SPHERE.is_dir() and not args.synthetic
     stack = read_stack(GRAY_SPHERE, geometry=LINE) if real else read_stack(synthetic(args.output / "stack", args.size))
     # irradiances are in units that make a white surface facing the light full scale, unless stated
-    scene = replace(stack.scene, sensor=Sensor(exposure=torch.pi))
+    scene = stack.scene if stack.sensor_stated else replace(stack.scene, sensor=Sensor(exposure=torch.pi))
     photographs = stack.images.mean(-1, keepdim=True)  # grey: the three channels say the same of sigma
     valid = usable(scene, limb=70, highlight=20, shadow=75)
     points = int(scene.surface.mask.sum())
@@ -57,7 +58,7 @@ def main() -> None:
     rms = {name: found.residual_rms for name, found in fitted.items()}
     gain = 1 - (rms["QualitativeOrenNayar"] / rms["Lambert"]) ** 2
     print(f"Oren-Nayar explains {gain:.1%} of the variance that Lambert leaves; the figure shows where it does not.")
-    shown = {name: render(scene, found.model).detach() * torch.pi for name, found in fitted.items()}
+    shown = {name: render(scene, found.model).detach() * scene.sensor.exposure for name, found in fitted.items()}
     path = args.output / "photographs_fit.png"
     residual_figure(path, scene, photographs, shown, valid)
     print(f"Figure: {path}")

@@ -135,10 +135,10 @@ def _direction(theta: Tensor, phi: Tensor) -> Tensor:
 
 
 def _numbers(body: str, key: str) -> list[float]:
-    found = re.search(rf"^ *{key}: *(.*)$", body, re.M)
-    if found is None:
+    entry = re.search(rf"^ *{key}: *(.*)$", body, re.M)
+    if entry is None:
         raise ValueError(f"{key} is missing")
-    return [float(x) for x in found.group(1).split()]
+    return [float(x) for x in entry.group(1).split()]
 
 
 def _check_range(path: str | Path, micro: np.ndarray, low: float, high: float) -> None:
