@@ -27,7 +27,7 @@ def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: 
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo or sigma leave their domains.
     Deviations: from the exact model with all bounces 15 % rms and 219 % (0.33) or 250 % (0.57) at worst
-        (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`).
+        (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/benchmarks/ladder.py`).
         At the kink cos(dphi) = 0 the subgradient is that of the flat side.
     Source: Oren & Nayar 1994, eq. (30) and footnote 7 of the long version.
     """
