@@ -47,8 +47,8 @@ def draw_lobes(axis, model: tb.BRDF, polar: Tensor) -> None:
     if largest > 0:
         axis.plot(0.7 / math.pi / scale * x, 0.7 / math.pi / scale * y, "k:", linewidth=0.9)
     axis.plot((-1, 1), (0, 0), "k", linewidth=0.6)
-    axis.text(0, -0.04, f"{largest:.2g}/sr" if largest > 0 else "nothing else", fontsize=8.5, ha="center", va="top")
-    axis.set(xlim=(-1.05, 1.05), ylim=(-0.2, 1.05), aspect="equal")
+    axis.text(0, -0.09, f"{largest:.2g}/sr" if largest > 0 else "nothing else", fontsize=8.5, ha="center", va="top")
+    axis.set(xlim=(-1.05, 1.05), ylim=(-0.28, 1.05), aspect="equal")
 
 
 def tiled_room() -> Environment:
@@ -78,7 +78,7 @@ def main() -> None:
     args.output.mkdir(parents=True, exist_ok=True)
     objects = side_by_side([sphere(args.size, args.size, samples=3), vase(args.size, 3 * args.size // 4, samples=3)])
     rows = math.ceil(args.models / 3)
-    figure = Figure(figsize=(10.6, 1.44 * rows), layout="constrained")
+    figure = Figure(figsize=(10.6, 1.32 * rows), layout="constrained")
     axes = figure.subplots(rows, 6, squeeze=False, width_ratios=(1.2, 1) * 3).reshape(-1, 2)
     for axis in axes.flat:
         axis.set_axis_off()
@@ -86,8 +86,8 @@ def main() -> None:
     for (left, right), (caption, model) in zip(axes[: args.models], MODELS.items(), strict=False):
         name, parameters = caption.split("\n")
         left.imshow(picture(objects, model).numpy())
-        left.set_title(name, fontsize=9.5, loc="left", fontweight="bold", pad=12)
-        left.text(0, -2, parameters, fontsize=8, va="bottom")
+        left.set_title(name, fontsize=9.5, loc="left", fontweight="bold", pad=13)
+        left.annotate(parameters, (0, 1), (0, 3), "axes fraction", textcoords="offset points", fontsize=8)
         draw_lobes(right, model, polar)
         print(f"{name}: {parameters}", flush=True)
     figure.supxlabel(textwrap.fill(" ".join(__doc__.split()), 140), fontsize=9)

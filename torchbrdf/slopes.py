@@ -8,7 +8,7 @@ Gaussian slopes, eq. (26) normalised for azimuth *means*:
     w(theta) = exp(-theta^2 / 2 sigma^2) sin(theta) / Z(sigma) on [0, pi/2].
 sigma is the width of the truncated polar Gaussian, not the standard deviation of theta (for small sigma,
 E[theta^2] = 2 sigma^2).
-Source: Oren & Nayar 1994, eqs. (25), (26); `equations/oren_nayar.md`, section 6, for the normalisation.
+Source: Oren & Nayar 1994, eqs. (25), (26); `docs/equations/oren_nayar.md`, section 6, for the normalisation.
 """
 
 import math

@@ -4,7 +4,7 @@ and closed.
 In the slope plane a = u.p = A cos(psi), b = u.q = B cos(psi - delta) with A = tan(theta_a) tan(theta_i), B =
 tan(theta_a) tan(theta_r). All that is not smooth happens on the lobes a > 1 (half width f_A = arcsec A) and b > 1 (f_B)
 and on their overlap [low, high].
-Source: own derivation in `equations/oren_nayar.md`, section 5a; the paper's closed forms, section 5b, are in
+Source: own derivation in `docs/equations/oren_nayar.md`, section 5a; the paper's closed forms, section 5b, are in
     `azimuth_paper`.
 """
 
