@@ -71,7 +71,7 @@ def main() -> None:
     rms = {name: result.residual_rms for name, result in fits.items()}
     gain = 1 - (rms["QualitativeOrenNayar"] / rms["Lambert"]) ** 2
     print(f"Oren-Nayar explains {gain:.1%} of the variance that Lambert leaves; the figure shows where it does not.")
-    shown = {name: render(scene, result.model).detach() * torch.pi for name, result in fits.items()}
+    shown = {name: render(scene, result.model).detach() * scene.sensor.exposure for name, result in fits.items()}
     path = args.output / "photographs_fit.png"
     residual_figure(scene, photographs, shown, valid).savefig(path)
     print(f"Figure: {path}")

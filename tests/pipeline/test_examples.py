@@ -196,7 +196,7 @@ def test_plans_of_a_grid(run):
 def test_no_label_of_the_ladder_covers_another(load):
     example = load("benchmarks/ladder.py")
     record = json.loads(RECORD.read_text())
-    assert {row["name"] for row in record["rows"]} == {rung.name for rung in example["RUNGS"]}
+    assert {row["name"] for row in record["rows"]} <= {rung.name for rung in example["RUNGS"]}
     figure = example["draw"](record["rows"], record["machine"])
     (axis,) = figure.axes
     figure.draw_without_rendering()
