@@ -31,7 +31,7 @@ def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: 
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo or sigma leave their domains.
     Deviations: from the exact model with all bounces 15 % rms and 219 % (0.33) or 250 % (0.57) at worst
-        (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`).
+        (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/benchmarks/ladder.py`).
         At the kink cos(dphi) = 0 the subgradient is the mean of both sides.
     Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, eq. (30), and
         footnote 7 of its long version (1995, DOI 10.1007/BF01679684).

@@ -232,7 +232,7 @@ class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
     Raises: ValueError outside the domains or for nodes < 3.
     Deviations: the closed forms are exact for direct light in and across the plane of incidence and interpolated
         between, and eq. (48) approximates the exchange. From the exact model with all bounces: 4.3 % rms, 20 % at worst
-        (up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`).
+        (up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/benchmarks/ladder.py`).
     Source: Oren & Nayar 1994, long version (as `RoughSurface`), eqs. (24), (25), (45), (48), (49).
     """
 

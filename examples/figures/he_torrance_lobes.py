@@ -10,15 +10,13 @@ import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import matplotlib
-import matplotlib.pyplot as plt
 import torch
+from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from torch import Tensor
 
 from torchbrdf import ACRYLIC, ALUMINIUM, MAGNESIUM_OXIDE, HeTorrance, fixed
 
-matplotlib.use("Agg")
 CONE = math.pi / 1024  # [sr]
 Shown = dict[int, tuple[str, HeTorrance, tuple[int, ...]]]
 
@@ -42,8 +40,8 @@ def figures() -> Shown:
     white, blue = (fixed(torch.tensor(a).double()) for a in (0.9, 0.15))
     rough = (0.28, 1.77)
     return {
-        7: ("aluminium, wavelength 2.0", material(ALUMINIUM, *rough, [2.0], **seen), (10, 45, 75)),
-        8: ("aluminium, wavelength 0.5", material(ALUMINIUM, *rough, [0.5], **seen), (10, 30, 45, 60, 75)),
+        7: ("aluminium, wavelength 2 um", material(ALUMINIUM, *rough, [2.0], **seen), (10, 45, 75)),
+        8: ("aluminium, wavelength 0.5 um", material(ALUMINIUM, *rough, [0.5], **seen), (10, 30, 45, 60, 75)),
         9: ("magnesium oxide", material(MAGNESIUM_OXIDE, 1.45, 13.2, [0.5], diffuse=white, **seen), (10, 45, 60, 75)),
         10: ("sandpaper, sigma0/tau = 4.4", material(ACRYLIC, 44.0, 10.0, [0.55], **seen), (0,)),
         11: ("blue plastic", material(ACRYLIC, 0.0, 1.0, [0.46], diffuse=blue, **seen), (15, 30, 45, 60)),
@@ -94,8 +92,8 @@ def claims(shown: Shown) -> Iterator[tuple[int, str, bool]]:
     yield 11, f"specular and uniform parts alone: {found}", all(p["directional_diffuse"] == 0 for p in parts)
 
 
-def draw(shown: Shown, points: int, path: Path) -> None:
-    figure = plt.figure(figsize=(13, 7.4), layout="constrained")
+def draw(shown: Shown, points: int) -> Figure:
+    figure = Figure(figsize=(13, 7.4), dpi=80, layout="constrained")
     views = torch.linspace(-89, 89, points, dtype=torch.float64)
     for place, (number, (title, model, angles)) in enumerate(shown.items(), 1):
         polar = number != 11
@@ -130,8 +128,7 @@ def draw(shown: Shown, points: int, path: Path) -> None:
     axis.legend(fontsize=8)
     axis.grid(alpha=0.4)
     figure.suptitle("f_r in the plane of incidence, over its value in the mirror direction (11: absolute)")
-    figure.savefig(path, dpi=80)
-    plt.close(figure)
+    return figure
 
 
 @torch.no_grad()
@@ -145,7 +142,7 @@ def main() -> None:
     for number, found, holds in claims(shown):
         print(f"Figure {number}, {found}: {'holds' if holds else 'does NOT hold'}")
     path = args.output / "he_torrance_lobes.png"
-    draw(shown, args.points, path)
+    draw(shown, args.points).savefig(path)
     print(f"Picture: {path}")
 
 
