@@ -67,6 +67,20 @@ from torchbrdf.models.he_torrance.polarised import (
     he_torrance_polarised,
     polarised_specular_reflectivity,
 )
+from torchbrdf.models.heightfield.roughness import (
+    rms_slope_from_beckmann_alpha,
+    rms_slope_from_sigma,
+    sigma_from_rms_slope,
+)
+from torchbrdf.models.heightfield.surface import (
+    GaussianHeightfield,
+    gaussian_heightfield,
+)
+from torchbrdf.models.heightfield.visibility import (
+    MESHED_HEIGHTFIELD,
+    SMOOTH_HEIGHTFIELD,
+    HeightfieldConstants,
+)
 from torchbrdf.models.lambert import (
     Lambert,
 )
@@ -201,9 +215,11 @@ __all__ = [  # noqa: RUF022 - in plain order
     "FujiiOrenNayar",
     "GGX",
     "GOLD",
+    "GaussianHeightfield",
     "HalfVector",
     "Hapke",
     "HeTorrance",
+    "HeightfieldConstants",
     "ImageBRDF",
     "Interval",
     "Lambert",
@@ -211,6 +227,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "LinearBRDF",
     "LommelSeeliger",
     "MAGNESIUM_OXIDE",
+    "MESHED_HEIGHTFIELD",
     "MaxCosinePhong",
     "MeasuredIndex",
     "Minnaert",
@@ -224,6 +241,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "QualitativeOrenNayar",
     "RoughSurface",
     "SILVER",
+    "SMOOTH_HEIGHTFIELD",
     "Sample",
     "Schlick",
     "SellmeierIndex",
@@ -247,6 +265,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "f0_from_index",
     "fast_rough_surface",
     "fixed",
+    "gaussian_heightfield",
     "gaussian_weights",
     "he_torrance",
     "he_torrance_polarised",
@@ -258,6 +277,8 @@ __all__ = [  # noqa: RUF022 - in plain order
     "phong_radiance",
     "polarised_specular_reflectivity",
     "qualitative",
+    "rms_slope_from_beckmann_alpha",
+    "rms_slope_from_sigma",
     "rusinkiewicz_angles",
     "sample_slope",
     "schlick",
@@ -265,6 +286,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "sigma_from_beckmann_alpha",
     "sigma_from_degrees",
     "sigma_from_mean_slope",
+    "sigma_from_rms_slope",
     "simulated",
     "smith_correlated",
     "smith_separable",
