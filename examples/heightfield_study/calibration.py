@@ -15,6 +15,11 @@ TURN_LIMIT = np.radians(61)  # polar angles beyond are left out of the fit of az
 
 
 class Model(Protocol):
+    """Constants that the library has, the highest occlusion E it takes, and the BRDF by bounce."""
+
+    @property
+    def constants(self) -> Sequence[float]: ...
+
     @property
     def highest_occlusion(self) -> float: ...
 

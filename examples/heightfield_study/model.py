@@ -1,7 +1,7 @@
 """The library's heightfield at the directions of a sample."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 import torch
@@ -9,7 +9,7 @@ from surfaces import Array
 
 from torchbrdf import Cosines, fixed
 from torchbrdf.models.heightfield.surface import OCCLUSION, GaussianHeightfield
-from torchbrdf.models.heightfield.visibility import HeightfieldConstants
+from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
 
 NODES = 384  # 2e-5 of f_1
 
@@ -19,6 +19,7 @@ class LibraryModel:
     """f_n (n, i, r, k) as a function of (slope, occlusion, constants, bounces)."""
 
     cosines: Cosines
+    constants: tuple[float, ...] = astuple(SMOOTH_HEIGHTFIELD)
     highest_occlusion: float = OCCLUSION.high
 
     @classmethod

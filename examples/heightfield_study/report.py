@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from calibration import Error, Fit, Model, constants, error, occlusion, turn
+from runs import Study
 from samples import Sample, chi_square, distinct
 
 NAMES = ("a", "b", "K", "k")
@@ -16,12 +17,13 @@ PARTS = {
 BOUNCES = 24
 
 
-def mesh_table(meshes: dict[int, Sample], limit: Sample) -> list[str]:
+def mesh_table(study: Study) -> list[str]:
     """What meshes of so many cells per tau do to f_1, f_2 and f_3, against the limit from the two finest."""
+    limit = study.limit
     lines = [f"Meshes against the limit of vanishing cells, s = {limit.slope:g}, % (80/80: equal angles of 80 deg):"]
     lines.append("  cells/tau  bounce    rms  +- of an entry    80/80 at 180 deg      80/80 at 0 deg")
-    for cells, sample in meshes.items():
-        for n in range(3):
+    for cells, sample in study.meshes.items():
+        for n in range(min(3, len(limit.f))):
             each = (sample.each[:, n] - limit.each[:, n]) / limit.f[n]
             mean, se = 100 * each.mean(0), 100 * each.std(0, ddof=1) / np.sqrt(len(each))
             rms, noise = (np.sqrt(np.mean(distinct(values) ** 2)) for values in (mean, se))
@@ -68,16 +70,27 @@ def agreement(one: Sample, other: Sample) -> str:
     return f"mean square of difference over standard error (1: as expected): {values}"
 
 
-def full_report(model: Model, smooth: Sequence[Sample], others: dict[str, Sample]) -> list[str]:
-    """Calibration on smooth surfaces of several slopes, the errors left, and surfaces of other spectra."""
-    fit = constants(model, smooth)
-    values = fit.values.tolist()
-    lines = [constants_line(fit), "", *turn_table(model, values, smooth), ""]
-    cases = [(f"s = {sample.slope:g}", sample, 1.0) for sample in smooth]
-    spectra = {title: occlusion(model, values, [sample]) for title, sample in others.items()}
-    cases += [(title, sample, spectra[title].values.item()) for title, sample in others.items()]
-    lines += [*error_table(model, values, cases), ""]
-    lines += [
-        f"Occlusion of {title}: E = {e.values.item():.3f} +- {e.errors.item():.3f}" for title, e in spectra.items()
-    ]
+def full_report(
+    model: Model, direct: Sequence[Sample], smooth: Sequence[Sample], others: dict[str, Sample]
+) -> list[str]:
+    """Constants from direct light, the errors left on other surfaces, and surfaces of other spectra.
+
+    Errors are given for the constants found and for those that the library has.
+    """
+    fit = constants(model, direct)
+    sets = {"found here": fit.values.tolist(), "of the library": list(model.constants)}
+    lines = [constants_line(fit)]
+    for title, values in sets.items():
+        spectra = {name: occlusion(model, values, [sample]) for name, sample in others.items()}
+        cases = [(f"s = {sample.slope:g}", sample, 1.0) for sample in smooth]
+        cases += [(name, sample, spectra[name].values.item()) for name, sample in others.items()]
+        lines += ["", f"With the constants {title}", *error_table(model, values, cases)]
+        lines += [_occlusion_line(name, e, model.highest_occlusion) for name, e in spectra.items()]
+        lines += turn_table(model, values, smooth)
     return lines
+
+
+def _occlusion_line(name: str, e: Fit, highest: float) -> str:
+    value, se = e.values.item(), e.errors.item()
+    bound = value > 0.999 * highest
+    return f"E of {name}: " + (f"{highest:g}, the most the model takes" if bound else f"{value:.3f} +- {se:.3f}")
