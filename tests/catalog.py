@@ -1,6 +1,7 @@
 """Every model once, with the laws it is known to break and why. Add a row for each new model."""
 
 import torch
+from catalog_heightfield import HEIGHTFIELD
 from catalog_oren_nayar import OREN_NAYAR
 from materials import Model, brushed, colour, number
 
@@ -275,4 +276,4 @@ OTHERS = [
     ),
 ]
 
-MODELS = [*OREN_NAYAR, *OTHERS]
+MODELS = [*OREN_NAYAR, *HEIGHTFIELD, *OTHERS]

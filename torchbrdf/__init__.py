@@ -70,6 +70,20 @@ from torchbrdf.models.he_torrance.reflectance import (
     he_torrance,
     specular_reflectivity,
 )
+from torchbrdf.models.heightfield.roughness import (
+    rms_slope_from_beckmann_alpha,
+    rms_slope_from_sigma,
+    sigma_from_rms_slope,
+)
+from torchbrdf.models.heightfield.surface import (
+    GaussianHeightfield,
+    gaussian_heightfield,
+)
+from torchbrdf.models.heightfield.visibility import (
+    MESHED_HEIGHTFIELD,
+    SMOOTH_HEIGHTFIELD,
+    HeightfieldConstants,
+)
 from torchbrdf.models.lambert import (
     Lambert,
 )
@@ -200,9 +214,11 @@ __all__ = [  # noqa: RUF022 - in plain order
     "FujiiOrenNayar",
     "GGX",
     "GOLD",
+    "GaussianHeightfield",
     "HalfVector",
     "Hapke",
     "HeTorrance",
+    "HeightfieldConstants",
     "ImageBRDF",
     "Interval",
     "Lambert",
@@ -210,6 +226,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "LinearBRDF",
     "LommelSeeliger",
     "MAGNESIUM_OXIDE",
+    "MESHED_HEIGHTFIELD",
     "MaxCosinePhong",
     "MeasuredIndex",
     "Minnaert",
@@ -223,6 +240,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "QualitativeOrenNayar",
     "RoughSurface",
     "SILVER",
+    "SMOOTH_HEIGHTFIELD",
     "Sample",
     "Schlick",
     "SellmeierIndex",
@@ -245,6 +263,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "f0_from_index",
     "fast_rough_surface",
     "fixed",
+    "gaussian_heightfield",
     "gaussian_weights",
     "he_torrance",
     "he_torrance_polarised",
@@ -255,6 +274,8 @@ __all__ = [  # noqa: RUF022 - in plain order
     "phong_radiance",
     "polarised_specular_reflectivity",
     "qualitative",
+    "rms_slope_from_beckmann_alpha",
+    "rms_slope_from_sigma",
     "rusinkiewicz_angles",
     "sample_slope",
     "schlick",
@@ -262,6 +283,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "sigma_from_beckmann_alpha",
     "sigma_from_degrees",
     "sigma_from_mean_slope",
+    "sigma_from_rms_slope",
     "simulated",
     "smith_correlated",
     "smith_separable",

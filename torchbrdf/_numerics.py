@@ -15,6 +15,8 @@ from torch import Tensor
 _ANGLE_DEGREE = {torch.float64: 20, torch.float32: 9}
 # A normalised vector is of unit length to a few rounding errors; data stored with six digits is not.
 _UNIT_TOLERANCE_IN_EPS = 64
+# sin^2(phi/2) below which an azimuth from dot products is rounding: some thousand eps in float64, ten in float32.
+_TIP = {torch.float64: 1e-12, torch.float32: 1e-6}
 
 
 def _angle_over_sine_polynomial(degree: int) -> tuple[float, ...]:
@@ -84,6 +86,24 @@ def safe_sqrt(x: Tensor) -> Tensor:
     """sqrt(x), and 0 with zero gradient where rounding left x at or below 0."""
     empty = x <= 0
     return x.masked_fill(empty, 1.0).sqrt().masked_fill(empty, 0.0)
+
+
+def soft_sqrt(x: Tensor) -> Tensor:
+    """sqrt(x) for x >= 0 with all derivatives finite, 0 at x = 0 where x has none itself: one pass, for large arrays.
+
+    The smallest normal number is added below the root, which changes no digit of a root above 1e-130 (float32: 1e-15).
+    """
+    return (x + torch.finfo(x.dtype).tiny).sqrt()
+
+
+def half_turn_sine(cosine: Tensor, sine: Tensor) -> Tensor:
+    """sin(phi/2) (...) in [0, 1] from cosine and sine of an azimuth: no digits are lost at 0, a cone's tip.
+
+    Zero gradient where sin^2(phi/2) cannot be told from 0 by the cosine alone; the value is kept.
+    """
+    squared = ((1 - cosine) * (1 - cosine) + sine * sine) / 4
+    tip = squared <= _TIP[squared.dtype]
+    return torch.where(tip, safe_sqrt(squared.detach()), squared.masked_fill(tip, 1.0).sqrt())
 
 
 def safe_divide(numerator: Tensor, denominator: Tensor, *, where: Tensor) -> Tensor:
