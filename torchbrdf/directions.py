@@ -127,6 +127,20 @@ class Cosines:
         )
 
     @_computed_once
+    def azimuth_sine(self) -> Tensor:
+        """sin(alpha) sin(beta) |sin(dphi)| (...): |normal . (light x view)|; zero subgradient where it is 0.
+
+        From the vectors where they are known, else as the root of a determinant that loses half the
+        digits where it is small.
+        """
+        if self.vectors is not None:
+            n, s, v = self.vectors
+            volume = dot(n, cross(s, v)).masked_fill(~self.above_horizon, 0.0)
+            return volume.abs()
+        squares = self.light * self.light + self.view * self.view + self.phase * self.phase
+        return safe_sqrt(1 - squares + 2 * self.light * self.view * self.phase)
+
+    @_computed_once
     def tangent_plane(self) -> TangentPlane:
         """Components of light and view along tangent and bitangent; 0 below the horizon.
 
