@@ -5,12 +5,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 
 import torch
-from numpy.polynomial.legendre import leggauss
 from torch import Tensor, nn
 
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
 from torchbrdf.parameters import WEIGHT, Constrained, Parametric, fixed
+from torchbrdf.quadrature import gauss_legendre
 from torchbrdf.sampled import Sampled, propose_from_parts
 
 PIXELS_AT_A_TIME = 4096
@@ -67,14 +67,13 @@ class BRDF(Sampled, Parametric, ABC):
         Oren-Nayar models are good to 3e-4 up to 85 degrees; narrow lobes need more nodes than they have
         widths in the hemisphere. Anisotropic models: for a view in the plane of normal and tangent.
         """
-        x, w = leggauss(nodes)
+        x, w = gauss_legendre(nodes, cos_view)
         # the nodes come first, so that per-texel parameters line up with cos_view
         column = (nodes, 1, *(1,) * cos_view.ndim)
-        cos_light = cos_view.new_tensor((1 + x) / 2).reshape(column)
-        dphi = cos_view.new_tensor((1 + x) / 2 * math.pi).reshape(column).transpose(0, 1)
-        w_light, w_dphi = (cos_view.new_tensor(w).reshape(shape) for shape in (cos_light.shape, dphi.shape))
+        cos_light, w_light = (t.reshape(column) for t in (x, w))
+        dphi, w_dphi = (math.pi * t.reshape(column).transpose(0, 1) for t in (x, w))
         # d(cos_light) d(dphi) over half the circle of azimuths, which the other half mirrors
-        weight = cos_light * (w_light / 2) * (w_dphi / 2 * math.pi) * 2
+        weight = cos_light * w_light * w_dphi * 2
         sin_view, sin_light = (safe_sqrt((1 - c) * (1 + c)) for c in (cos_view, cos_light))
         if self.anisotropic:  # the view lies in the plane of normal and tangent
             weight = torch.cat((weight, weight), 1) / 2

@@ -17,6 +17,7 @@ from torchbrdf.parameters import (
     Parametric,
     fixed,
 )
+from torchbrdf.quadrature import gauss_legendre
 
 # Relative index of a dielectric seen from either side; total internal reflection below 1.
 RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1)
@@ -250,9 +251,6 @@ class Conductor(Fresnel):
 
     def average(self, *, nodes: int = 32) -> Tensor:
         """By Gauss-Legendre quadrature: there is no closed form. Error below 1e-9 for metals."""
-        from numpy.polynomial.legendre import leggauss
-
         eta, k = torch.atleast_1d(self.eta), torch.atleast_1d(self.k)
-        x, w = (eta.new_tensor(a).reshape(nodes, *(1,) * eta.ndim) for a in leggauss(nodes))
-        c = (1 + x) / 2
-        return (conductor(c, eta=eta, k=k) * c * w).sum(0)
+        c, w = (t.reshape(nodes, *(1,) * eta.ndim) for t in gauss_legendre(nodes, eta))
+        return (conductor(c, eta=eta, k=k) * 2 * c * w).sum(0)

@@ -19,13 +19,13 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import torch
-from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 from torch.autograd.gradcheck import GradcheckError
 from torch.func import functional_call
 
 from torchbrdf.brdf import BRDF, LinearBRDF, WeightedSum
 from torchbrdf.directions import Cosines
+from torchbrdf.quadrature import gauss_legendre
 
 
 @dataclass(frozen=True)
@@ -264,9 +264,8 @@ def _directional_albedo(brdf: BRDF, view_angle: float, nodes: int) -> Tensor:
 
 
 def _panels(ends: list[float], nodes: int) -> tuple[Tensor, Tensor]:
-    x, w = (torch.from_numpy(a) for a in leggauss(nodes))
-    points = torch.cat([a + (b - a) * (1 + x) / 2 for a, b in pairwise(ends)])
-    return points, torch.cat([(b - a) / 2 * w for a, b in pairwise(ends)])
+    x, w = gauss_legendre(nodes, torch.empty((), dtype=torch.float64))
+    return torch.cat([a + (b - a) * x for a, b in pairwise(ends)]), torch.cat([(b - a) * w for a, b in pairwise(ends)])
 
 
 def _polar(theta_degrees: float, phi_degrees: float) -> Tensor:
