@@ -154,6 +154,7 @@ from torchbrdf.optical_constants import (
 from torchbrdf.parameters import (
     Constrained,
     Interval,
+    ParameterValue,
     Simplex,
     fixed,
     is_per_texel,
@@ -219,6 +220,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Option",
     "OrenNayar",
     "Oriented",
+    "ParameterValue",
     "Perfect",
     "Phong",
     "QualitativeOrenNayar",

@@ -14,8 +14,8 @@ from torchbrdf.parameters import (
     REFRACTIVE_INDEX,
     Constrained,
     Interval,
+    ParameterValue,
     Parametric,
-    fixed,
 )
 from torchbrdf.quadrature import gauss_legendre
 
@@ -188,7 +188,7 @@ class ConstantFresnel(Fresnel):
 
     value: Constrained = Constrained(ALBEDO)
 
-    def __init__(self, *, value: Tensor | float | fixed):
+    def __init__(self, *, value: ParameterValue):
         super().__init__()
         self.value = value
 
@@ -205,7 +205,7 @@ class Schlick(Fresnel):
 
     f0: Constrained = Constrained(ALBEDO)
 
-    def __init__(self, *, f0: Tensor | float | fixed = 0.04):
+    def __init__(self, *, f0: ParameterValue = 0.04):
         super().__init__()
         self.f0 = f0
 
@@ -223,7 +223,7 @@ class Dielectric(Fresnel):
 
     eta: Constrained = Constrained(REFRACTIVE_INDEX)
 
-    def __init__(self, *, eta: Tensor | float | fixed = 1.5):
+    def __init__(self, *, eta: ParameterValue = 1.5):
         super().__init__()
         self.eta = eta
 
@@ -241,7 +241,7 @@ class Conductor(Fresnel):
     eta: Constrained = Constrained(RELATIVE_INDEX)
     k: Constrained = Constrained(ABSORPTION_INDEX)
 
-    def __init__(self, *, eta: Tensor | float | fixed = 0.2, k: Tensor | float | fixed = 3.5):
+    def __init__(self, *, eta: ParameterValue = 0.2, k: ParameterValue = 3.5):
         super().__init__()
         self.eta = eta
         self.k = k

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from torchbrdf.brdf import LinearBRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.parameters import ALBEDO, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, Constrained, ParameterValue
 
 
 @final
@@ -24,7 +24,7 @@ class Lambert(LinearBRDF):
 
     albedo: Constrained = Constrained(ALBEDO)
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5):
+    def __init__(self, *, albedo: ParameterValue = 0.5):
         super().__init__()
         self.albedo = albedo
 

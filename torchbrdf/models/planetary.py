@@ -9,7 +9,7 @@ from torch import Tensor
 from torchbrdf._numerics import angle, safe_divide, safe_power, safe_sqrt, sine_excess
 from torchbrdf.brdf import BRDF, LinearBRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, ParameterValue
 
 ASYMMETRY = Interval(-1.0, 1.0)
 SURGE = Interval(0.0, math.inf)
@@ -73,7 +73,7 @@ class LommelSeeliger(LinearBRDF):
     albedo: Constrained = Constrained(ALBEDO)
     uniform_share = 0.5
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5):
+    def __init__(self, *, albedo: ParameterValue = 0.5):
         super().__init__()
         self.albedo = albedo
 
@@ -106,7 +106,7 @@ class LambertSphere(LinearBRDF):
     albedo: Constrained = Constrained(ALBEDO)
     uniform_share = 0.25
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5):
+    def __init__(self, *, albedo: ParameterValue = 0.5):
         super().__init__()
         self.albedo = albedo
 
@@ -148,10 +148,10 @@ class Hapke(BRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        asymmetry: Tensor | float | fixed = -0.3,
-        surge: Tensor | float | fixed = 0.5,
-        surge_width: Tensor | float | fixed = 0.05,
+        albedo: ParameterValue = 0.5,
+        asymmetry: ParameterValue = -0.3,
+        surge: ParameterValue = 0.5,
+        surge_width: ParameterValue = 0.05,
     ):
         super().__init__()
         self.albedo = albedo

@@ -9,7 +9,7 @@ from torch import Tensor
 from torchbrdf._numerics import angle_over_sine, safe_sqrt
 from torchbrdf.brdf import LinearBRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, ParameterValue
 from torchbrdf.sampling import CltcSampled
 
 # 1/2 - 2/(3 pi) and 2/3 - 28/(15 pi): the mean of the retro term at grazing, and over the hemisphere.
@@ -100,7 +100,7 @@ class FujiiOrenNayar(_RoughDiffuse):
     Source: Fujii 2012; Portsmouth, Kutz & Hill 2025.
     """
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5, roughness: Tensor | float | fixed = 0.5):
+    def __init__(self, *, albedo: ParameterValue = 0.5, roughness: ParameterValue = 0.5):
         super().__init__()
         self.albedo = albedo
         self.roughness = roughness
@@ -138,8 +138,8 @@ class EON(_RoughDiffuse):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        roughness: Tensor | float | fixed = 0.5,
+        albedo: ParameterValue = 0.5,
+        roughness: ParameterValue = 0.5,
         exact: bool = True,
     ):
         super().__init__()

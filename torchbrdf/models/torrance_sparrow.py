@@ -17,7 +17,7 @@ from torchbrdf.microfacet import (
     v_cavity_masking,
     visible_azimuth,
 )
-from torchbrdf.parameters import ROUGHNESS, Constrained, fixed
+from torchbrdf.parameters import ROUGHNESS, Constrained, ParameterValue
 from torchbrdf.sampling import along_view, mirrored
 
 
@@ -73,7 +73,7 @@ class TorranceSparrow(BRDF):
 
     sigma: Constrained = Constrained(ROUGHNESS)
 
-    def __init__(self, *, sigma: Tensor | float | fixed = 0.3, fresnel: Fresnel | None = None, normalised: bool = True):
+    def __init__(self, *, sigma: ParameterValue = 0.3, fresnel: Fresnel | None = None, normalised: bool = True):
         super().__init__()
         self.sigma = sigma
         self.fresnel = Perfect() if fresnel is None else fresnel

@@ -16,7 +16,7 @@ from torch import Tensor
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.models.oren_nayar.ring import KAPPA, KNEE, Ring, Term, chebyshev, chebyshev_slope, contract, knee, ring
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 Bounces = Literal[2, "all"]
@@ -192,9 +192,7 @@ class FastRoughSurface(CltcSampled, BRDF):
     albedo: Constrained = Constrained(ALBEDO)
     sigma: Constrained = Constrained(ROUGHNESS)
 
-    def __init__(
-        self, *, albedo: Tensor | float | fixed = 0.5, sigma: Tensor | float | fixed = 0.3, bounces: Bounces = "all"
-    ):
+    def __init__(self, *, albedo: ParameterValue = 0.5, sigma: ParameterValue = 0.3, bounces: Bounces = "all"):
         super().__init__()
         _check_bounces("FastRoughSurface", bounces)
         self.albedo = albedo

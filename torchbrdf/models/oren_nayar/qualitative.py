@@ -9,7 +9,7 @@ from torch import Tensor
 from torchbrdf._numerics import positive_part
 from torchbrdf.brdf import LinearBRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
@@ -73,8 +73,8 @@ class QualitativeOrenNayar(CltcSampled, LinearBRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma: Tensor | float | fixed = 0.3,
+        albedo: ParameterValue = 0.5,
+        sigma: ParameterValue = 0.3,
         a_constant: float = 0.33,
     ):
         super().__init__()

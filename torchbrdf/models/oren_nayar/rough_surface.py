@@ -12,7 +12,7 @@ from torchbrdf.models.oren_nayar.azimuth_paper import direct_mean_paper, two_bou
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, modes_of
 from torchbrdf.models.oren_nayar.images import Bounces, flat_coefficients, mean_images
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane, slope_plane
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Simplex, fixed
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, Simplex, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 from torchbrdf.slopes import gaussian_weights, shared_slopes
 
@@ -113,8 +113,8 @@ class RoughSurface(SharedSlopes):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma: Tensor | float | fixed = 0.3,
+        albedo: ParameterValue = 0.5,
+        sigma: ParameterValue = 0.3,
         nodes: int = 16,
         order: int = 4,
         graded: bool = False,
@@ -159,7 +159,7 @@ class TabulatedRoughSurface(SharedSlopes):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
+        albedo: ParameterValue = 0.5,
         weights: Tensor | fixed,
         order: int = 4,
         graded: bool = False,
@@ -204,7 +204,7 @@ class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
     albedo: Constrained = Constrained(ALBEDO)
     sigma: Constrained = Constrained(ROUGHNESS)
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5, sigma: Tensor | float | fixed = 0.3, nodes: int = 16):
+    def __init__(self, *, albedo: ParameterValue = 0.5, sigma: ParameterValue = 0.3, nodes: int = 16):
         super().__init__()
         shared_slopes(nodes)
         self.albedo = albedo
