@@ -165,6 +165,7 @@ from torchbrdf.optical_constants import (
 from torchbrdf.parameters import (
     Constrained,
     Interval,
+    ParameterValue,
     Simplex,
     fixed,
     is_per_texel,
@@ -235,6 +236,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Option",
     "OrenNayar",
     "Oriented",
+    "ParameterValue",
     "Perfect",
     "Phong",
     "QualitativeOrenNayar",

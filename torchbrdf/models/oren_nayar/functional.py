@@ -13,7 +13,7 @@ from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
 from torchbrdf.models.rungs import Member, stand_ins
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed, kept
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
@@ -46,8 +46,8 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
     ALBEDO.check("oren_nayar: albedo", albedo)
     ROUGHNESS.check("oren_nayar: sigma", sigma)
     coefficients = direct_coefficients(albedo, sigma) + interreflection_coefficients(albedo, sigma)
-    f = sum(c * t[..., None] for c, t in zip(coefficients.unbind(-1), geometry_terms(cosines), strict=True))
-    return cosines.zero_below_horizon(torch.as_tensor(f))
+    terms = torch.stack(torch.broadcast_tensors(*geometry_terms(cosines)), -1)
+    return cosines.zero_below_horizon((coefficients * terms[..., None, :]).sum(-1))
 
 
 def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -112,8 +112,8 @@ class OrenNayar(CltcSampled, LinearBRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma: Tensor | float | fixed = 0.3,
+        albedo: ParameterValue = 0.5,
+        sigma: ParameterValue = 0.3,
         direct: bool = True,
         interreflection: bool = True,
         c3: bool = True,

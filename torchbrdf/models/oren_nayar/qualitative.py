@@ -12,7 +12,7 @@ from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.models.rungs import Member, lambert, stand_ins
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
@@ -77,8 +77,8 @@ class QualitativeOrenNayar(CltcSampled, LinearBRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma: Tensor | float | fixed = 0.3,
+        albedo: ParameterValue = 0.5,
+        sigma: ParameterValue = 0.3,
         a_constant: float = 0.33,
     ):
         super().__init__()
