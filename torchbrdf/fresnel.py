@@ -16,6 +16,7 @@ from torchbrdf.parameters import (
     Interval,
     ParameterValue,
     Parametric,
+    fixed,
 )
 from torchbrdf.quadrature import gauss_legendre
 
