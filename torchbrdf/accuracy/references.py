@@ -33,7 +33,8 @@ def converged(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
     Raises: TypeError for directions that are not float64; ValueError when albedo or sigma leave their domains.
     Accuracy: direct light 1e-11 and two bounces 3e-9 of the golden values. Three and more bounces are known less well:
         at rho = 1 to 2e-8 of the whole for sigma = 0.3, and to 2e-5 for sigma = 1.
-    Source: Oren & Nayar 1994 (long version), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+        (1995, DOI 10.1007/BF01679684), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
     """
     ALBEDO.check("converged: albedo", albedo)
     ROUGHNESS.check("converged: sigma", sigma)

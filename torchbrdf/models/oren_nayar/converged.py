@@ -4,7 +4,7 @@ The azimuth mean of one slope angle is exact (direct) or split at every kink (in
 slope angle it has kinks of its own where a direction starts to be cut (tan theta_a = 1/tan theta) and where two lobes
 start to overlap; the slope integral is split there, at a few widths of the Gaussian, and at multiples of the kinks,
 because beyond a kink the mean varies with the *ratio* of the angle to the kink.
-Source: Oren & Nayar 1994 (long version), sections 4.1-4.3; where the integrals are split: own.
+Source: `equations/oren_nayar.md`, section 6.
 """
 
 import math
