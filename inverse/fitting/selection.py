@@ -93,7 +93,8 @@ def clear_of_clipping(sensor: Sensor, recorded: Tensor, predicted: Tensor, used:
 
     A cut-off noise has another mean and another width, by which ambient light, exposure and all errors come out
     wrong. The choice follows the predicted values: to leave out the samples that were recorded dark would keep those
-    of the same pixels that noise has brightened. An end of the scale where no sample was recorded has cut nothing off, nor has black where samples lie below it.
+    of the same pixels that noise has brightened. An end of the scale where no sample was recorded has cut nothing
+    off, nor has black where samples lie below it.
 
     Args:
         sensor: whose noise it is; where it states none, the width is taken from the residuals.
