@@ -10,6 +10,7 @@ from torch import Tensor
 
 from inverse.fitting.identifiability import Covariance, judge
 from inverse.fitting.levenberg_marquardt import Residual, Solution, minimise
+from inverse.fitting.misfit import warnings_of
 from inverse.fitting.prediction import predictor
 from inverse.fitting.result import FitResult
 from inverse.fitting.selection import checked, clear_of_clipping, usable_samples
@@ -107,9 +108,12 @@ def fit(
         best = minimise(residual_of(used), best.shared, best.own, max_steps=max_steps)
         best.iterations, best.history = best.iterations + earlier.iterations, earlier.history + best.history
     samples = int(used.sum())
+    predicted = predict(best.shared, best.own).detach()
+    unknown_values = len(best.shared) + best.own.numel()
+    warnings = warnings_of(scene.sensor, predicted, predicted - recorded, used, unknown_values)
     return judged(
-        model, unknowns, best, samples=samples, clipped=int(first_used.sum()) - samples, unit="of full scale",
-        throw=throw, began=began,
+        model, unknowns, best, samples=samples, clipped=int(first_used.sum()) - samples, warnings=warnings,
+        unit="of full scale", throw=throw, began=began,
     )  # fmt: skip
 
 
@@ -134,18 +138,21 @@ def judged(
     throw: bool,
     began: float,
     clipped: int = 0,
+    warnings: tuple[str, ...] = (),
 ) -> FitResult:
     """What a solution says; `model` receives the parameters found.
 
     Args:
         samples: how many of the residuals are not held at 0.
         clipped: how many of those held at 0 are so because they may be clipped.
+        warnings: what the residuals say against it.
         unit: of the residuals.
         began: `time.perf_counter()` of the caller's start.
     Raises: FitError when it diverged, unless `throw` is false.
     """
     seconds = time.perf_counter() - began
     result = _result(unknowns, best, model, samples=samples, clipped=clipped, unit=unit, seconds=seconds)
+    result = replace(result, warnings=warnings)
     if result.status == "diverged" and throw:
         raise FitError(result)
     return result
@@ -226,6 +233,7 @@ def _result(
         residual_rms=math.sqrt(best.equations.cost / samples),
         samples=samples,
         clipped=clipped,
+        warnings=(),
         seconds=seconds,
         model=model,
         history=best.history,

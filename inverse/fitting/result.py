@@ -34,6 +34,8 @@ class FitResult:
         residual_rms: of the used samples, in `residual_unit`.
         samples: number of samples used.
         clipped: number of samples left out because noise there may have been clipped at black or at full scale.
+        warnings: what residuals that are no noise of the sensor say against the fit, with the likely cause; empty where
+            nothing, and where the sensor states no noise.
         model: a fitted copy of the model.
         history: cost after each step.
         residual_unit: "of full scale" (of the sensor) for photographs, "1/sr" for measured reflectance.
@@ -52,6 +54,7 @@ class FitResult:
     residual_rms: float
     samples: int
     clipped: int
+    warnings: tuple[str, ...]
     seconds: float
     model: BRDF
     history: list[float]
@@ -67,7 +70,9 @@ class FitResult:
                 rows.append(("correlation", f"{self.correlation[i, j]:+.2f} ({self.names[i]}, {self.names[j]})"))
         left_out = f", {self.clipped} left out that may be clipped" if self.clipped else ""
         rows.append(("residual rms", f"{self.residual_rms:.3g} {self.residual_unit}, {self.samples} samples{left_out}"))
-        rows.append(("status", f"{self.status}: {self.reason} ({self.seconds:.2f} s)"))
+        doubted = ", with warnings" if self.warnings else ""
+        rows.append(("status", f"{self.status}{doubted}: {self.reason} ({self.seconds:.2f} s)"))
+        rows += [("warning", warning) for warning in self.warnings]
         width = max(14, *(len(name) + 2 for name, _ in rows))
         return "\n".join(f"{name:<{width}}{text}" for name, text in rows)
 
@@ -93,6 +98,7 @@ class FitResult:
     def to_json(self) -> dict[str, Any]:
         """Plain numbers, lists and strings; None for what is not finite. Angles in degrees, named so."""
         report: dict[str, Any] = {"model": type(self.model).__name__, "status": self.status, "reason": self.reason}
+        report["warnings"] = list(self.warnings)
         for name, value in self.parameters.items():
             angular = name in self.angles
             key = f"{name}_degrees" if angular else name
