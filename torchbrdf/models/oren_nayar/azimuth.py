@@ -4,8 +4,8 @@ and closed.
 In the slope plane a = u.p = A cos(psi), b = u.q = B cos(psi - delta) with A = tan(theta_a) tan(theta_i), B =
 tan(theta_a) tan(theta_r). All that is not smooth happens on the lobes a > 1 (half width f_A = arcsec A) and b > 1 (f_B)
 and on their overlap [low, high].
-Source: own derivation in `docs/equations/oren_nayar.md`, section 5a; the paper's closed forms, section 5b, are in
-    `azimuth_paper`.
+Source: own derivation in `docs/equations/oren_nayar.md`, section 5a; the closed forms of Oren & Nayar 1994 (DOI
+    10.1145/192161.192213, numbered as in its long version), section 5b there, are in `azimuth_paper`.
 """
 
 import math
@@ -34,8 +34,8 @@ class Lobes(NamedTuple):
 
 
 def saturated_lobes(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> Lobes:
-    """A, B and the critical angles f_A, f_B of eq. (39), 0 where nothing saturates. The slope broadcasts with the
-    plane.
+    """A, B and the critical angles f_A, f_B of Oren & Nayar 1994, eq. (39), 0 where nothing saturates. The slope
+    broadcasts with the plane.
     """
     light, view = tan_slope * plane.tan_light, tan_slope * plane.tan_view
     return Lobes(cos_slope, tan_slope, light, view, arcsec(light), arcsec(view), arccsc(light), arccsc(view))
@@ -50,9 +50,9 @@ def overlap(lobes: Lobes, angle: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def saturated_correlation(plane: SlopePlane, lobes: Lobes) -> Tensor:
-    """Azimuth mean of c(a) c(b), c(z) = clamp(z, -1, 1): CC of section 5a (...). [-] in [-1, 1]
+    """Azimuth mean of c(a) c(b), c(z) = clamp(z, -1, 1): CC of the module's source (...). [-] in [-1, 1]
 
-    Section 5a adds terms of size A B that cancel on steep slopes at grazing angles. Here the part proportional to A B
+    The source adds terms of size A B that cancel on steep slopes at grazing angles. Here the part proportional to A B
     cos(delta) is summed beforehand, and everything is written in the clear zones pi/2 - f, which are what remains
     small.
     """
@@ -67,8 +67,8 @@ def saturated_correlation(plane: SlopePlane, lobes: Lobes) -> Tensor:
 
 
 def common_excess(plane: SlopePlane, lobes: Lobes) -> Tensor:
-    """Azimuth mean of 2 (min(a, b) - 1)+: what the overlap of masking and shadowing gives back; m of section 5a (...).
-    [-]
+    """Azimuth mean of 2 (min(a, b) - 1)+: what the overlap of masking and shadowing gives back; m of the module's
+    source (...). [-]
     """
     low, high = overlap(lobes, plane.delta)
     turn = torch.minimum(
@@ -86,7 +86,8 @@ def direct_mean(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> T
 
     Args: the plane (...) and cos, tan of the slope angle, broadcastable with it. [-]
     Returns: (...). [1/sr] Not masked at the horizon.
-    Source: section 5a (own derivation; the paper gives only delta = 0, pi/2, pi and an interpolation).
+    Source: `docs/equations/oren_nayar.md`, section 5a (own derivation; Oren & Nayar 1994, eqs. (40)-(45), give only
+        delta = 0, pi/2, pi and an interpolation).
     """
     lobes = saturated_lobes(plane, cos_slope=cos_slope, tan_slope=tan_slope)
     return direct_from(common_excess(plane, lobes), saturated_correlation(plane, lobes), cos_slope)
@@ -98,8 +99,9 @@ def direct_from(excess: Tensor, correlation: Tensor, cos_slope: Tensor) -> Tenso
 
 
 def two_bounce_mean_approximate(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> Tensor:
-    """Exact azimuth mean of the approximate exchange (48): (1/pi) C (1 - C)(1 - CC) (...). [1/sr] Source: section
-    5a.
+    """Exact azimuth mean of an approximate exchange: (1/pi) C (1 - C)(1 - CC) (...). [1/sr]
+
+    Source: exchange: Oren & Nayar 1994, eq. (48); mean: `docs/equations/oren_nayar.md`, section 5a.
     """
     lobes = saturated_lobes(plane, cos_slope=cos_slope, tan_slope=tan_slope)
     return cos_slope * (1 - cos_slope) * (1 - saturated_correlation(plane, lobes)) / math.pi

@@ -3,7 +3,7 @@ line.
 
 For a direction s the point p = s_xy / s_z has length tan(theta); a facet of slope angle theta_a is the point u of
 length tan(theta_a). With p for the light and q for the view,  <s,a> = s_z a_z X, X = 1 + u.p,  <v,a> = v_z a_z Y, Y = 1
-+ u.q,  and the opposite facet of the cavity is -u. Source: repaired sheet `docs/equations/oren_nayar.md`, section 1.
++ u.q,  and the opposite facet of the cavity is -u. Source: own derivation, `docs/equations/oren_nayar.md`, section 1.
 """
 
 from typing import NamedTuple
