@@ -16,7 +16,7 @@ import surfaces  # noqa: E402
 from runs import Plan, carry_out  # noqa: E402
 from samples import Sample, chi_square, distinct  # noqa: E402
 from terrain import Terrain  # noqa: E402
-from tracing import Directions, trace  # noqa: E402
+from tracing import Directions, cosine_steps, on_sphere, trace  # noqa: E402
 
 STUDENT_7 = 5.408  # two-sided 1e-3 of Student's t with 7 degrees of freedom
 
@@ -89,6 +89,14 @@ def test_rays_land_on_the_surface():
     assert landed[directions[:, 2] < 0].mean() > 0.999
     below, _ = terrain.drop(points[landed][:, :2] % terrain.length)
     np.testing.assert_allclose(below[:, 2], points[landed][:, 2], atol=1e-4)
+
+
+def test_steps_follow_the_cosine():
+    normals = np.broadcast_to([0.6, 0.0, 0.8], (200_000, 3))
+    cosine = (cosine_steps(normals, on_sphere(len(normals), np.random.default_rng(6))) * normals).sum(1)
+    assert cosine.min() >= 0
+    for power in (1, 2, 4):  # five standard errors or more: one seed in a million fails
+        assert (cosine**power).mean() == pytest.approx(2 / (power + 2), abs=4e-3)
 
 
 def test_energy_and_projected_area():
