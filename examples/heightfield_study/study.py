@@ -1,7 +1,7 @@
 """Path tracing of random heightfields as they are: the calibration and the errors of `GaussianHeightfield`.
 
     pip install "torchbrdf[study]"
-    python examples/heightfield_study/study.py [--large] [--share 1] [--processes 2] [--output FOLDER] [--against FILE ...]
+    python examples/heightfield_study/study.py [--large] [--share 1] [--processes 2] [--output FOLDER] [--against FILE]
 
 Time: the small run about five minutes of one core, the large one (1008^2 vertices, 24 bounces) about 45; both share
 themselves among processes. `--share 0.4` takes 0.4 of the surfaces for a first look.
