@@ -4,18 +4,10 @@ from dataclasses import replace
 
 import pytest
 import torch
+from helpers.planned_scenes import FRONT, OBLIQUE, SENSOR, clay
 
-from inverse import Distant, Scene, Sensor, everything, fit, plan, plane, render, sphere
+from inverse import Distant, Scene, everything, fit, plan, plane, render, sphere
 from torchbrdf import FastRoughSurface, HeTorrance, OrenNayar, RoughSurface, TorranceSparrow, fixed
-
-FRONT, OBLIQUE = Distant.from_angle(0), Distant.from_angle(20)
-
-
-def clay(rho=0.7, sigma=0.6):
-    return RoughSurface(albedo=rho, sigma=sigma, bounces="all", nodes=8)
-
-
-SENSOR = Sensor(exposure=3.0, read_noise=0.01)
 
 
 @pytest.mark.parametrize("sigma", [0.1, 0.6])

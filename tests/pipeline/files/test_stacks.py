@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from helpers.png_files import png_bytes
+from helpers.stack_folder import SIZE
 from PIL import Image
-from png_files import png_bytes
 
 from inverse import (
     Ambient,
@@ -33,20 +34,7 @@ from inverse import (
 )
 from torchbrdf import OrenNayar
 
-GRAY_SPHERE = Path(__file__).parents[3] / "shared" / "data" / "gray_sphere"
-
-SIZE = (20, 24)
-LIGHTS = "2\n0 0 1\n0.6 0 0.8 2.5  # a comment\n"
-
-
-@pytest.fixture
-def folder(tmp_path):
-    """Two images of a sphere of 8 pixels at column 12, row 9, in natural order image2, image10."""
-    for number, level in ((10, 40000), (2, 20000)):
-        (tmp_path / f"image{number}.png").write_bytes(png_bytes(np.full((*SIZE, 3), level)))
-    (tmp_path / "lights.txt").write_text(LIGHTS)
-    (tmp_path / "geometry.txt").write_text("# the ball\nsphere 12 9 8\n")
-    return tmp_path
+GRAY_SPHERE = Path(__file__).parents[4] / "shared" / "data" / "gray_sphere"
 
 
 def test_reads_a_stack(folder):
@@ -59,18 +47,6 @@ def test_reads_a_stack(folder):
     (first,), (second,) = photos.scene.lights
     torch.testing.assert_close(second.direction, torch.tensor([0.6, 0, 0.8], dtype=torch.float64))
     assert (first.irradiance, second.irradiance) == (1.0, 2.5)
-
-
-def test_sphere_stands_where_the_line_says(folder):
-    surface = read_stack(folder, dtype=torch.float64).scene.surface
-    for row, column in ((9, 12), (9, 19), (3, 12), (14, 8)):
-        x, y = (column - 12) / 8, (9 - row) / 8  # rows run down, y up
-        expected = torch.tensor([x, y, (1 - x * x - y * y) ** 0.5], dtype=torch.float64)
-        torch.testing.assert_close(surface.normals[row, column], expected)
-    row, column = torch.meshgrid(torch.arange(20), torch.arange(24), indexing="ij")
-    distance = (row - 9) ** 2 + (column - 12) ** 2
-    sure = distance != 64  # a pixel exactly on the circle may fall on either side
-    assert torch.equal(surface.mask[sure], (distance < 64)[sure])
 
 
 def test_mask_restricts_the_geometry(folder):
@@ -93,35 +69,6 @@ def test_arguments_override_the_folder(folder):
     assert photos.scene.surface.mask[5, 5]
     assert not photos.scene.surface.mask[9, 12]
     assert photos.images[0, 0, 0, 0] < 0.1  # 0.31 encoded
-
-
-@pytest.mark.parametrize("kind", ["npy", "png"])
-def test_normal_map(folder, kind):
-    truth = sphere(*SIZE, radius=0.7)
-    if kind == "npy":
-        np.save(folder / "shape.npy", torch.where(truth.mask[..., None], truth.normals, torch.nan).numpy())
-        tolerance = 1e-6
-    else:
-        coded = torch.where(truth.mask[..., None], (truth.normals + 1) / 2, 0.0)
-        (folder / "shape.png").write_bytes(png_bytes((coded * 65535).round().numpy()))
-        tolerance = 2 / 65535
-    surface = read_stack(folder, geometry=f"normals shape.{kind}").scene.surface
-    assert torch.equal(surface.mask, truth.mask)
-    torch.testing.assert_close(surface.normals, truth.normals, atol=tolerance, rtol=0)
-
-
-def test_depth_map(folder):
-    rows, columns = np.indices(SIZE)
-    np.save(folder / "depth.npy", 50 - 0.5 * columns + 0.25 * rows)  # nearer to the right and to the top
-    surface = read_stack(folder, geometry="depth depth.npy").scene.surface
-    n = torch.tensor([-0.5, 0.25, 1.0])
-    # z = 0.5 x + 0.25 y in a frame with y up; its normal is (-0.5, -0.25, 1)
-    n[1] = -0.25
-    torch.testing.assert_close(surface.normals[10, 10], n / n.norm())
-    np.save(folder / "depth.npy", np.full(SIZE, 5.0))
-    seen = read_stack(folder, geometry="depth depth.npy 30 30 11.5 9.5").scene.surface
-    torch.testing.assert_close(seen.normals[10, 10], torch.tensor([0.0, 0, 1]), atol=1e-5, rtol=0)
-    assert seen.view.shape == (*SIZE, 3)
 
 
 def write_lights(text):
@@ -231,15 +178,6 @@ def test_written_stack_keeps_the_sensor(tmp_path):
         assert abs(fitted.parameters[name].item() - value) < 5 * fitted.standard_error[name].item() < 0.2
 
 
-def test_a_folder_without_a_sensor_says_so(folder):
-    photos = read_stack(folder)
-    assert not photos.sensor_stated
-    assert photos.scene.sensor == Sensor()
-    (folder / "stack.json").write_text('{"sensor": {"exposure": 2.5}}')
-    assert read_stack(folder).scene.sensor == Sensor(exposure=2.5)
-    assert len(read_stack(folder).scene.lights) == 2  # of lights.txt
-
-
 class Ring(Light):
     """A user's own: eight directions at 30 degrees around the camera, and a glow."""
 
@@ -326,13 +264,6 @@ def test_lights_follow_the_names_of_their_images(tmp_path):
     assert light.irradiance == 11.0
 
 
-def test_lights_of_a_text_may_be_coloured(folder):
-    (folder / "lights.txt").write_text("0 0 1 1 .5 .25\n0.6 0 0.8\n")
-    (first,), (second,) = read_stack(folder).scene.lights
-    assert first.irradiance.tolist() == [1, 0.5, 0.25]
-    assert second.irradiance == 1.0
-
-
 def test_written_stack_keeps_full_pixels_only(tmp_path):
     surface = sphere(16, 16, samples=4)
     write_stack(tmp_path, torch.full((1, 16, 16, 1), 0.5), Scene(surface, [Distant.from_angle(0)]))
@@ -353,30 +284,6 @@ def test_refuses_to_write_what_no_folder_can_hold(tmp_path, lights, message):
     with pytest.raises(ValueError, match=message):
         write_stack(tmp_path / "new", torch.full((1, 8, 8, 1), 0.5), Scene(sphere(8, 8), lights))
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("{", "stack.json: "),
-        ("[]", "stack.json: must be"),
-        ('{"exposure": 3}', "stack.json: must be"),
-        ('{"sensor": {"gain": 3}}', "stack.json: .*gain"),
-        ('{"sensor": {"exposure": -3}}', r"stack.json: Sensor\.exposure must be positive and finite; found -3"),
-        ('{"lights": {"image2.png": [{"uniform": 1}]}}', "stack.json: has no lights for the images image10.png"),
-        ('{"lights": [1]}', "stack.json: "),
-        ('{"lights": {"image2.png": [{"glow": 1}]}}', "stack.json: lights of image2.png: .*glow"),
-        ('{"lights": {"image2.png": [{"directions": [[0, 0, 1]]}]}}', "irradiances with its directions"),
-        ('{"lights": {"image2.png": [{"directions": [[0, 0, 2]], "irradiances": [[1]]}]}}', "must be unit vectors"),
-        ('{"lights": {"image2.png": [{"directions": [[0, 0, 1]], "irradiances": [[-1]]}]}}', "not negative"),
-        ('{"lights": {"image2.png": [{"positions": [0, 0, 1], "intensities": [[1]]}]}}', r"positions \(lamp, 3\)"),
-        ('{"lights": {"image2.png": [{}]}}', "found none of them"),
-    ],
-)
-def test_bad_stack_file(folder, text, message):
-    (folder / "stack.json").write_text(text)
-    with pytest.raises(ValueError, match=message):
-        read_stack(folder)
 
 
 @pytest.mark.skipif(not GRAY_SPHERE.is_dir(), reason=f"the photographs are not at {GRAY_SPHERE}")

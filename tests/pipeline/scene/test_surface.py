@@ -1,22 +1,12 @@
-"""Normals of every geometry against analytic, autograd and finite-difference ones."""
+"""Normals, points and coverage of every shape against analytic, autograd and finite-difference ones."""
 
 import math
 
 import pytest
 import torch
 
-from inverse.scene.maps import from_depth, from_normals
-from inverse.scene.surface import (
-    Surface,
-    cylinder,
-    pixel_average,
-    pixel_grid,
-    plane,
-    revolution,
-    sphere,
-    vase,
-    vase_profile,
-)
+from inverse import Group, Plane, Sphere, cuboid, cylinder, orthographic, side_by_side, sphere
+from inverse.scene.surface import Surface, pixel_average, pixel_grid, plane, revolution, vase, vase_profile
 
 D = torch.float64
 SURFACES = {
@@ -162,85 +152,9 @@ def test_coverage_approaches_the_disk():
     assert ((coverage > 0) & (coverage < 1)).any()
 
 
-# --- depth maps --------------------------------------------------------------------------------------------
-
-
-def disk(size, radius):
-    row, column = torch.meshgrid(torch.arange(size, dtype=D), torch.arange(size, dtype=D), indexing="ij")
-    return column - (size - 1) / 2, (size - 1) / 2 - row, radius
-
-
-def test_orthographic_depth_of_a_sphere():
-    x, y, r = disk(201, 90.0)
-    z = (r**2 - x**2 - y**2).clamp(min=0).sqrt()
-    depth = torch.where(z > 0, 500 - z, 0.0)
-    surface = from_depth(depth)
-    expected = torch.stack((x, y, z), -1) / r
-    inside = surface.mask & (z > 0.5 * r)
-    # kornia's differences over two pixels: slope error z'''/6 <= 3/(2 r^2) / cos^5 here
-    torch.testing.assert_close(surface.normals[inside], expected[inside], atol=4e-3, rtol=0)
-    assert surface.view.tolist() == [0, 0, 1]
-
-
-def test_perspective_depth_of_a_sphere():
-    """Rays of a pinhole meet a sphere in closed form."""
-    size, focal, distance, radius = 201, 400.0, 10.0, 2.0
-    u, v, _ = disk(size, 0)
-    ray = torch.stack((u / focal, v / focal, -torch.ones_like(u)), -1)  # z towards the camera
-    centre = torch.tensor([0.0, 0.0, -distance], dtype=D)
-    a, b = (ray * ray).sum(-1), ray @ centre
-    root = b**2 - a * (distance**2 - radius**2)
-    t = (b - root.clamp(min=0).sqrt()) / a
-    depth = torch.where(root > 0, t, torch.nan)
-    middle = (size - 1) / 2
-    matrix = torch.tensor([[focal, 0, middle], [0, focal, middle], [0, 0, 1]], dtype=D)
-    surface = from_depth(depth, matrix)
-    points = t[..., None] * ray
-    normals = (points - centre) / radius
-    view = -ray / ray.norm(dim=-1, keepdim=True)
-    inside = surface.mask & ((normals * view).sum(-1) > 0.5)
-    assert inside.sum() > 10000
-    torch.testing.assert_close(surface.normals[inside], normals[inside], atol=5e-3, rtol=0)
-    torch.testing.assert_close(surface.view[inside], view[inside], atol=1e-12, rtol=0)
-    torch.testing.assert_close(surface.points[inside], points[inside], atol=1e-12, rtol=1e-12)
-
-
-def test_depth_leaves_out_the_rim():
-    depth = torch.zeros(9, 9)
-    depth[2:7, 2:7] = 5.0
-    expected = torch.zeros(9, 9, dtype=torch.bool)
-    expected[3:6, 3:6] = True
-    assert torch.equal(from_depth(depth).mask, expected)
-    depth = torch.full((9, 9), 5.0)
-    assert from_depth(depth).mask.sum() == 49
-    mask = torch.zeros(9, 9, dtype=torch.bool)
-    mask[2:7, 2:7] = True
-    assert torch.equal(from_depth(depth, mask=mask).mask, expected)
-
-
-# --- normal maps and refusals ------------------------------------------------------------------------------
-
-
-def test_normal_map_is_scaled_and_masked():
-    given = torch.zeros(3, 4, 3, dtype=D)
-    given[1, 2] = torch.tensor([0.0, 3.0, 4.0])
-    surface = from_normals(given)
-    assert surface.mask.nonzero().tolist() == [[1, 2]]
-    torch.testing.assert_close(surface.normals[1, 2], torch.tensor([0, 0.6, 0.8], dtype=D))
-    with pytest.raises(ValueError, match="normals must be finite and non-zero on the object; 11 are not"):
-        from_normals(given, torch.ones(3, 4, dtype=torch.bool))
-
-
 @pytest.mark.parametrize(
     ("make_bad", "message"),
     [
-        (
-            lambda: from_normals(torch.zeros(3, 4)),
-            r"normals must be floating-point of shape \(rows, columns, 3\); found torch.float32 \(3, 4\)",
-        ),
-        (lambda: from_normals(torch.zeros(3, 4, 3)), "mask is empty"),
-        (lambda: from_depth(torch.zeros(3, 4, 1)), r"depth must have shape \(rows, columns\); found \(3, 4, 1\)"),
-        (lambda: from_depth(torch.zeros(5, 5)), "mask is empty"),
         (lambda: plane(4, 4, normal=(0.0, 1.0, 0.0)), "face the camera"),
         (lambda: plane(4, 4, normal=(0.0, math.nan, 1.0)), "finite"),
         (lambda: sphere(4, 4, radius=0.01), "mask is empty"),
@@ -266,3 +180,52 @@ def surface_of(**changed):
         "samples": 2,
     }
     return Surface(**(good | changed))
+
+
+def test_cube_turned_by_yaw_shows_two_faces():
+    surface = cuboid(400, 400, yaw=30, dtype=D)
+    a = math.radians(30)
+    faces = {(round(math.sin(a), 9), 0.0, round(math.cos(a), 9)), (round(-math.cos(a), 9), 0.0, round(math.sin(a), 9))}
+    seen = {tuple(round(k, 9) + 0.0 for k in n) for n in surface.normals[surface.mask].tolist()}
+    assert seen == faces
+    # width and height of the silhouette: 2 (h cos + h sin) and 2 h
+    columns = surface.mask.any(0).sum().item() * 2 / 400
+    assert columns == pytest.approx(math.cos(a) + math.sin(a), abs=0.011)
+    assert surface.mask.any(1).sum().item() * 2 / 400 == pytest.approx(1.0, abs=0.011)
+
+
+@pytest.mark.parametrize(("yaw", "pitch"), [(0, 0), (25, 0), (-40, 20), (90, 0), (10, -35)])
+def test_points_lie_on_the_faces_their_normals_say(yaw, pitch):
+    surface = cuboid(64, 64, half_sizes=(0.6, 0.4, 0.3), yaw=yaw, pitch=pitch, dtype=D)
+    points, normals = surface.points[surface.mask], surface.normals[surface.mask]
+    distance = (points * normals).sum(-1)
+    nearest = (distance[:, None] - torch.tensor([0.6, 0.4, 0.3], dtype=D)).abs().amin(1)
+    assert nearest.max() < 1e-12
+    assert (normals[:, 2] > 0).all()
+
+
+def test_side_by_side_keeps_objects_apart_and_positions_right():
+    ball, drum = sphere(50, 60, radius=0.7, dtype=D), cylinder(50, 80, dtype=D)
+    both = side_by_side([ball, drum])
+    assert both.resolution == (50, 140)
+    # the middles of the windows stand 70 pixels apart
+    centres = [both.points[:, k][both.mask[:, k]].mean(0)[0] for k in (slice(0, 60), slice(60, 140))]
+    assert (centres[1] - centres[0]).item() == pytest.approx(70 * 2 / 50, abs=1e-9)
+    x = both.points[0, :, 0]
+    torch.testing.assert_close(x.diff(), torch.full((139,), 2 / 50, dtype=D))
+
+
+def test_bad_solids():
+    with pytest.raises(ValueError, match="half_sizes must be positive"):
+        cuboid(8, 8, half_sizes=(0.5, 0.0, 0.5))
+    with pytest.raises(ValueError, match=r"heights \[8, 16\]"):
+        side_by_side([sphere(8, 8), sphere(16, 16)])
+
+
+def test_orthographic_group_shows_the_nearer_solid():
+    group = Group((Sphere(0.5), Plane((0.0, 0.0, 1.0), (0.0, 0.0, -0.5))))
+    surface = orthographic(group, 41, 41, dtype=D)
+    assert surface.mask.all()
+    assert surface.points[20, 20, 2].item() == pytest.approx(0.5, abs=1e-3)
+    assert surface.points[0, 0, 2].item() == pytest.approx(-0.5)
+    assert surface.normals[0, 0].tolist() == [0, 0, 1]

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("embreex", reason="the study's ray caster is not installed: pip install torchbrdf[study]")
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "examples" / "heightfield_study"))
 
 import calibration  # noqa: E402

@@ -15,7 +15,7 @@ from PIL import Image
 import torchbrdf
 from torchbrdf import BRDF
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = Path(__file__).parents[3] / "examples"
 RECORD = EXAMPLES.parent / "docs" / "figures" / "ladder.json"
 MEASURED = "TORCHBRDF_CORNELL"  # environment variable: the folder of the measured paints, which are not ours to ship
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import tifffile
 import torch
+from helpers.png_files import png_bytes
 from PIL import Image
-from png_files import png_bytes
 
 from inverse import read_image, write_image
 
-GRAY_SPHERE = Path(__file__).parents[3] / "shared" / "data" / "gray_sphere"
+GRAY_SPHERE = Path(__file__).parents[4] / "shared" / "data" / "gray_sphere"
 
 
 def samples(bits: int, channels: int) -> np.ndarray:

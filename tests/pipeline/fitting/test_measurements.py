@@ -24,7 +24,7 @@ from torchbrdf import (
 )
 
 DOUBLE = torch.float64
-CORNELL = Path(__file__).parents[3] / "shared" / "data" / "cornell_brdf"
+CORNELL = Path(__file__).parents[4] / "shared" / "data" / "cornell_brdf"
 
 
 def directions(count=300, steepest=1.35, seed=3):

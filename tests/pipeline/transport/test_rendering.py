@@ -6,27 +6,76 @@ from itertools import pairwise
 import pytest
 import torch
 
+from inverse import Ambient, Disc, Distant, Environment, Point, Scene, plane, render, sphere
 from inverse.scene.footprints import Footprints
-from inverse.scene.lights import Ambient, Distant
 from inverse.scene.maps import from_depth
-from inverse.scene.scene import Scene
-from inverse.scene.surface import cylinder, plane, sphere
-from inverse.transport.rendering import cosines_to, radiance_of, render
-from torchbrdf import Lambert, OrenNayar, QualitativeOrenNayar
+from inverse.scene.surface import cylinder
+from inverse.transport.rendering import cosines_to, radiance_of
+from torchbrdf import Coupled, Lambert, Mirror, OrenNayar, QualitativeOrenNayar, Schlick
 
 D = torch.float64
+
+UP = torch.tensor([0.0, 0.0, 1.0], dtype=D)
+
+
+def vector(*values):
+    return torch.tensor(values, dtype=D)
 
 
 def number(value):
     return torch.tensor(value, dtype=D)
 
 
-def lambert(albedo=0.6):
-    return Lambert(albedo=torch.tensor(albedo, dtype=D))
-
-
 def rough():
     return OrenNayar(albedo=torch.tensor([0.7, 0.4, 0.2], dtype=D), sigma=number(0.5))
+
+
+@pytest.fixture
+def spot():
+    """A plane of one pixel, at the origin, facing the camera."""
+    return plane(1, 1, dtype=D)
+
+
+def test_lights_of_an_image_add(spot):
+    """(28): the sum over sources of f I max(0, n.d)/r^2, written out."""
+    model, places, strengths = rough(), [vector(1, 2, 3), vector(-2, 0, 1), vector(0, 1, -1)], [5.0, 3.0, 7.0]
+    wanted = torch.zeros(3, dtype=D)
+    for place, strength in zip(places, strengths, strict=True):
+        r2 = (place * place).sum()
+        direction = place / r2.sqrt()
+        wanted += model(UP, direction, UP) * strength * direction[2].clamp(min=0) / r2
+    lights = tuple(Point(place, strength) for place, strength in zip(places, strengths, strict=True))
+    torch.testing.assert_close(radiance_of(Footprints.of(spot), lights)(model)[0], wanted, rtol=1e-13, atol=0)
+
+
+def test_mirror_shows_its_environment():
+    """Each point reflects the radiance of the direction 2 (n.v) n - v; a lamp is invisible in it."""
+    image = torch.rand(16, 32, 3, dtype=D)
+    surface = sphere(9, 9, dtype=D)
+    mirror = Mirror(fresnel=Schlick(f0=number(0.2)))
+    found = render(Scene(surface, [Environment(image), Distant.from_angle(0)]), mirror)
+    assert (found[1] == 0).all()
+    for row, column in ((3, 6), (2, 5), (6, 3)):
+        n = surface.normals[row, column]
+        looked = 2 * n[2] * n - UP
+        polar, azimuth = math.acos(looked[1]), math.atan2(looked[0], -looked[2])
+        texel = image[int(polar / math.pi * 16), int((azimuth / (2 * math.pi) + 0.5) * 32) % 32]
+        wanted = (0.2 + 0.8 * (1 - n[2]) ** 5) * texel
+        torch.testing.assert_close(found[0, row, column], wanted, rtol=1e-9, atol=0)
+
+
+def test_polished_body_shows_body_and_mirror(spot):
+    """Under a uniform map the layered model returns mirror and body together: F + rho (1 - F)."""
+    model = Coupled(albedo=number(0.5), fresnel=Schlick(f0=number(0.1)))
+    white = Environment(torch.ones(64, 128, 1, dtype=D))
+    assert radiance_of(Footprints.of(spot), (white,))(model).item() == pytest.approx(0.1 + 0.5 * 0.9, rel=2e-3)
+    disc = Disc(UP, 0.1, 1.0)
+    lobe = radiance_of(Footprints.of(spot), (disc,))(Mirror()).item()
+    assert lobe == pytest.approx(disc.radiance.item(), rel=1e-12)
+
+
+def lambert(albedo=0.6):
+    return Lambert(albedo=torch.tensor(albedo, dtype=D))
 
 
 def test_lambert_sphere_is_rho_over_pi_times_cosine():
@@ -137,13 +186,6 @@ def test_supersampling_converges():
         assert 3.5 < coarse / fine < 4.6
 
 
-def test_supersampled_rim_is_partly_covered():
-    """A disk of radiance 1: each pixel is its covered share."""
-    surface = sphere(12, 12, radius=0.9, samples=4, dtype=D)
-    values = torch.ones(int(surface.mask.sum()), 1, dtype=D)
-    torch.testing.assert_close(Footprints.of(surface).to_image(values)[..., 0], surface.coverage())
-
-
 def test_perspective_view_directions_are_used():
     """A rough plane at z = -5 seen by a pinhole, each pixel by its own ray."""
     depth = torch.full((9, 9), 5.0, dtype=D)
@@ -191,15 +233,6 @@ class _Render(torch.nn.Module):
         return render(self.scene, self.model)
 
 
-# --- lights and scenes -------------------------------------------------------------------------------------
-
-
-def test_angles_count_to_the_right_of_the_camera():
-    for degrees in (-70, 0, 20, 90):
-        x, y, z = Distant.from_angle(degrees).direction.tolist()
-        assert (x, y, z) == pytest.approx((math.sin(math.radians(degrees)), 0, math.cos(math.radians(degrees))))
-
-
 def test_cosines_come_from_the_masked_points():
     surface = sphere(9, 9, dtype=D)
     cosines = cosines_to(next(Distant.from_angle(0).arrivals(surface.points[surface.mask])), Footprints.of(surface))
@@ -208,17 +241,9 @@ def test_cosines_come_from_the_masked_points():
     torch.testing.assert_close(cosines.phase, torch.ones_like(cosines.light))
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: Distant(torch.zeros(3)), r"Distant\.direction must be a vector \(3,\) other than 0"),
-        (lambda: Distant(torch.tensor([0.0, math.nan, 1.0])), r"Distant\.direction"),
-        (lambda: Distant(torch.ones(2)), r"Distant\.direction"),
-        (lambda: Distant.from_angle(0, -1.0), r"Distant\.irradiance must be finite and not negative; found -1\.0"),
-        (lambda: Ambient(-0.5), r"Ambient\.radiance must be finite and not negative; found -0\.5"),
-        (lambda: Scene(sphere(8, 8), []), r"Scene\.lights must hold .*found none"),
-    ],
-)
-def test_bad_lights(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
+def test_per_texel_albedo_under_ambient_light():
+    surface = sphere(16, 16, dtype=D)
+    points = int(surface.mask.sum())
+    albedo = torch.linspace(0.2, 0.9, points, dtype=D)[:, None]
+    image = render(Scene(surface, [Ambient(2.0)]), Lambert(albedo=albedo))[0]
+    torch.testing.assert_close(image[surface.mask], 2 * albedo, rtol=1e-12, atol=0)
