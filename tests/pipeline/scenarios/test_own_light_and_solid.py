@@ -13,6 +13,7 @@ from inverse import (
     Distant,
     Light,
     Patches,
+    Rays,
     Scene,
     Sensor,
     SimplerLight,
@@ -20,7 +21,9 @@ from inverse import (
     fit,
     orthographic,
     plan,
+    read_stack,
     render,
+    write_stack,
 )
 from torchbrdf import Lambert, OrenNayar
 
@@ -192,3 +195,20 @@ def test_plan_asks_own_light_and_solid():
     assert isinstance(coarse.scene.lights[0][0], Distant)
     full = render(everything(scene), model)
     assert float(((fine.render() - full).abs().max() / full.max()).detach()) < 1e-3
+
+
+def test_a_folder_keeps_own_light_in_numbers_and_own_solid_as_its_normals(tmp_path):
+    """The ring comes back as its seven rays; shadows aside, for which a folder has no solid."""
+    scene = Scene(seen(), [RING, (RING, Ambient(0.1))], Sensor(exposure=2.0), shadows=False)
+    model = OrenNayar(albedo=scalar(0.6), sigma=scalar(0.5))
+    with torch.no_grad():
+        images = render(scene, model)
+        write_stack(tmp_path / "crater", scene.sensor.expose(images), scene)
+        read = read_stack(tmp_path / "crater", dtype=D).scene
+        again = render(read, model)
+    ((rays,), (_, ambient)) = read.lights
+    assert isinstance(rays, Rays)
+    torch.testing.assert_close(rays.directions, torch.stack(list(RING.directions())), rtol=0, atol=0)
+    assert isinstance(ambient, Ambient)
+    torch.testing.assert_close(read.surface.normals, scene.surface.normals, rtol=0, atol=1e-15)
+    torch.testing.assert_close(again, images, rtol=1e-12, atol=1e-14)  # numbers and maps are written in full
