@@ -83,10 +83,10 @@ def test_linear_problem_against_dense_algebra(pixels, shared, own):
     residual, dense, constant = linear_problem(pixels, shared, own)
     x, y = torch.zeros(shared, dtype=D), torch.zeros(pixels, own, dtype=D)
     wanted = torch.linalg.lstsq(dense, -constant[:, None]).solution[:, 0]
-    found = minimise(residual, x, y, max_steps=50)
-    assert found.status == "converged"
-    torch.testing.assert_close(torch.cat((found.shared, found.own.flatten())), wanted, rtol=0, atol=1e-9)
-    equations = found.equations
+    solved = minimise(residual, x, y, max_steps=50)
+    assert solved.status == "converged"
+    torch.testing.assert_close(torch.cat((solved.shared, solved.own.flatten())), wanted, rtol=0, atol=1e-9)
+    equations = solved.equations
     normal = dense.T @ dense
     torch.testing.assert_close(equations.shared, normal[:shared, :shared])
     for k in range(pixels):
@@ -112,7 +112,7 @@ def test_a_bent_valley_is_followed_to_its_end():
         x, y = shared
         return torch.stack((10 * (y - x * x), 1 - x))[None, :, None]
 
-    found = minimise(residual, torch.tensor([-1.2, 1.0], dtype=D), torch.zeros(2, 0, dtype=D), max_steps=100)
-    assert found.status == "converged"
-    torch.testing.assert_close(found.shared, torch.ones(2, dtype=D), rtol=0, atol=1e-8)
-    assert all(later <= earlier for earlier, later in pairwise(found.history))
+    solved = minimise(residual, torch.tensor([-1.2, 1.0], dtype=D), torch.zeros(2, 0, dtype=D), max_steps=100)
+    assert solved.status == "converged"
+    torch.testing.assert_close(solved.shared, torch.ones(2, dtype=D), rtol=0, atol=1e-8)
+    assert all(later <= earlier for earlier, later in pairwise(solved.history))
