@@ -251,6 +251,24 @@ def test_tables_are_kept_while_the_parameters_stay():
     assert _kept_table.cache_info()[:2] == (2, 2)
 
 
+def test_no_derivative_is_lost_to_a_kept_table():
+    # by the roughness, of a derivative by the light: the inner transform does not see that the outer one asks
+    normal, light, view = random_directions(3, dtype=F64, generator=torch.Generator().manual_seed(9))
+    material = {"albedo": f64(0.9), "occlusion": f64(1.0), "nodes": 160, "polar_nodes": 5, "table_orders": 3}
+
+    def by_light(sigma):
+        def f(v):
+            c = Cosines.of(normal, v, view, normalize=True)
+            return gaussian_heightfield(c, sigma=sigma, **material).sum()
+
+        return torch.func.jvp(f, (light,), (torch.ones_like(light),))[1]
+
+    h, sigma = 1e-5, f64(0.6)
+    expected = (by_light(sigma + h) - by_light(sigma - h)) / (2 * h)
+    assert_close(torch.func.jvp(by_light, (sigma,), (f64(1.0),))[1], expected, rtol=1e-6, atol=1e-9)
+    assert_close(torch.func.grad(by_light)(sigma), expected, rtol=1e-6, atol=1e-9)
+
+
 def test_what_is_refused():
     with pytest.raises(ValueError, match=r"GaussianHeightfield: nodes must be one of 160, 240, 384, 560; found 200"):
         GaussianHeightfield(nodes=200)
