@@ -102,7 +102,7 @@ def test_azimuths_are_those_of_the_stretched_plane():
     x, y = xi[:, None], xi[None, :]
     rays = [ray(q.norm(), f64(1.0), SMOOTH_HEIGHTFIELD) for q in p]
     facing = [(1 + x * q[0] + y * q[1]).relu() for q in p]
-    masks = [facet_masking(r.steepness * g, r, f64(1.0)) for r, g in zip(rays, facing, strict=True)]
+    masks = [facet_masking(r.steepness * g, r) for r, g in zip(rays, facing, strict=True)]
     angle = math.acos(float(p[0] @ p[1] / (p[0].norm() * p[1].norm())))
     assert angle > 1.1
     apart = independence(rays[0], rays[1], f64(math.sin(angle / 2)), SMOOTH_HEIGHTFIELD)
@@ -127,7 +127,7 @@ def test_visibility_is_that_of_the_stretched_directions():
     rays = [ray(f64(s * math.tan(a)), f64(1.0), SMOOTH_HEIGHTFIELD) for a in (1.2, 1.0)]
     for k, sign in enumerate((1.0, -1.0)):
         facing = [(1 + r.tangent * c * grid).relu() for r, c in zip(rays, (1.0, sign), strict=True)]
-        masks = [facet_masking(r.steepness * g, r, f64(1.0)) for r, g in zip(rays, facing, strict=True)]
+        masks = [facet_masking(r.steepness * g, r) for r, g in zip(rays, facing, strict=True)]
         apart = independence(*rays, f64(0.0 if sign > 0 else 1.0), SMOOTH_HEIGHTFIELD)
         expected = (mass * facing[0] * facing[1] / (1 + joint_masking(*masks, apart))).sum() / math.pi
         assert f[k].item() == pytest.approx(expected.item(), rel=3e-4)

@@ -102,13 +102,15 @@ def test_two_scales_are_a_larger_occlusion():
         brdf = GaussianHeightfield.from_rms_slope(held(slope), occlusion=held(occlusion), constants=MESHED_HEIGHTFIELD)
         return rms(all_azimuths(brdf.fields(directions)[..., 0] / truth["f1"] - 1))
 
-    assert error(1.2) < 0.8 * error(1.0) < 0.5 * error(0.0)
+    assert error(1.6) < 0.008
+    assert error(1.0) > 0.06
+    assert error(0.0) > 0.1
 
 
 def test_without_roughness_it_is_lambert():
     directions = random_directions(200, dtype=F64, generator=torch.Generator().manual_seed(0))
     albedo = f64([0.2, 0.9])
-    for occlusion in (0.0, 1.0, 1.2):
+    for occlusion in (0.0, 1.0, 1.8):
         brdf = GaussianHeightfield(albedo=fixed(albedo), sigma=held(0.0), occlusion=held(occlusion))
         assert_close(brdf(*directions), Lambert(albedo=fixed(albedo))(*directions), rtol=4e-15, atol=0)
 
@@ -279,8 +281,8 @@ def test_what_is_refused():
             GaussianHeightfield(bounces=bounces)
     with pytest.raises(ValueError, match=r"polar_nodes and table_orders must be at least 2; found \(1, 24\)"):
         GaussianHeightfield(polar_nodes=1)
-    with pytest.raises(ValueError, match=r"GaussianHeightfield\.occlusion must lie in \[0, 1\.2\]"):
-        GaussianHeightfield(occlusion=held(1.3))
+    with pytest.raises(ValueError, match=r"GaussianHeightfield\.occlusion must lie in \[0, 1\.8\]"):
+        GaussianHeightfield(occlusion=held(1.9))
     with pytest.raises(ValueError, match=r"from_rms_slope: rms_slope must lie in \[0, 1\.482\]"):
         GaussianHeightfield.from_rms_slope(1.5)
     with pytest.raises(ValueError, match=r"gaussian_heightfield: sigma must lie in \[0, 1\.571\] rad"):
