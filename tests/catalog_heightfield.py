@@ -1,6 +1,6 @@
 """The rows of the random heightfields."""
 
-from materials import Model, colour, number
+from helpers.materials import Model, colour, number
 
 from torchbrdf import FastGaussianHeightfield, GaussianHeightfield, fixed
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 import torch
-from heightfields import F64, all_azimuths, cosines, f64, held, rms, traced, vectors
+from helpers.heightfields import F64, all_azimuths, cosines, f64, held, rms, traced, vectors
 from torch.testing import assert_close
 
 from torchbrdf import (

@@ -4,7 +4,19 @@ import math
 
 import pytest
 import torch
-from heightfields import F64, all_azimuths, cosines, f64, golden, golden_surface, held, rms, rotation, traced, vectors
+from helpers.heightfields import (
+    F64,
+    all_azimuths,
+    cosines,
+    f64,
+    golden,
+    golden_surface,
+    held,
+    rms,
+    rotation,
+    traced,
+    vectors,
+)
 from torch.testing import assert_close
 
 from torchbrdf import (

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import torch
-from heightfields import F64, cosines, f64
+from helpers.heightfields import F64, cosines, f64
 from torch.testing import assert_close
 
 from torchbrdf import (
