@@ -54,3 +54,12 @@ def test_samples_in_float32(model):
     assert ((light.norm(dim=-1) - 1).abs() < 1e-5).all()
     assert not light.requires_grad
     assert not pdf.requires_grad
+
+
+def test_one_view_takes_many_numbers(model):
+    brdf = model.make(torch.float64)
+    normal, _, view = (v[0] for v in laws.random_directions(1, dtype=torch.float64, generator=seeded(), max_angle=1.2))
+    u = torch.rand(20, 2, dtype=torch.float64, generator=seeded())
+    together = brdf.sample(normal, view, u)
+    for one, each in zip(together, brdf.sample(normal.expand(20, 3), view.expand(20, 3), u), strict=True):
+        torch.testing.assert_close(one, each, rtol=1e-9, atol=1e-12)
