@@ -6,11 +6,12 @@ import pytest
 import torch
 from helpers.heightfields import held
 
-from torchbrdf import FastGaussianHeightfield, GaussianHeightfield, sampling_laws
+from torchbrdf import FastGaussianHeightfield, GaussianHeightfield
+from torchbrdf import testing as laws
 
 
 def weights(brdf, degrees, draws):
-    setting = sampling_laws._Setting.of(brdf, math.radians(degrees))
+    setting = laws.SamplingSetup.of(brdf, math.radians(degrees))
     with torch.no_grad():
         return setting.draw(draws, torch.Generator().manual_seed(0)).weight[:, 0]
 
