@@ -1,8 +1,8 @@
 """Every model once, with the laws it is known to break and why. Add a row for each new model."""
 
 import torch
-from catalog_heightfield import HEIGHTFIELD
 
+from helpers.catalog_heightfield import HEIGHTFIELD
 from helpers.catalog_oren_nayar import OREN_NAYAR
 from helpers.materials import Model, brushed, colour, number
 from torchbrdf import (

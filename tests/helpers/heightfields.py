@@ -9,7 +9,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from torchbrdf import MESHED_HEIGHTFIELD, Cosines, GaussianHeightfield, fixed, sigma_from_rms_slope
+from torchbrdf import (
+    MESHED_HEIGHTFIELD,
+    Cosines,
+    GaussianHeightfield,
+    HeightfieldConstants,
+    fixed,
+    sigma_from_rms_slope,
+)
+from torchbrdf import testing as laws
 
 F64 = torch.float64
 DATA = Path(__file__).parents[1] / "data"
@@ -78,3 +86,35 @@ def rms(error: Tensor) -> float:
 def all_azimuths(error: Tensor) -> Tensor:
     """Entries (..., 9) of dphi in [0, pi] repeated as those of the whole turn: (..., 16)."""
     return torch.cat((error, error[..., 1:-1]), -1)
+
+
+GOLDEN_SLOPES = sorted(set(golden()["s"].tolist()))
+
+
+def golden_fields(nodes, polar_nodes=14):
+    """Orders (168, bounces) and their names, at the golden configurations."""
+    g = golden()
+    found = torch.zeros(len(g["s"]), 25, dtype=F64)
+    for slope in GOLDEN_SLOPES:
+        for occlusion in (0.0, 1.0, 1.15):
+            here = (g["s"] == slope) & (g["occlusion"] == occlusion)
+            brdf = golden_surface(slope, occlusion, nodes=nodes, polar_nodes=polar_nodes)
+            found[here] = brdf.fields(cosines(*(g[k][here] for k in ("theta_i", "theta_r", "dphi"))))
+    return found
+
+
+# A turn so fast that two rays know nothing of each other: l = 1.
+UNCORRELATED = HeightfieldConstants(level=0.5, grazing=0.3, turn=1e9, grazing_turn=0.0)
+
+
+def smith_masking(theta, slope):
+    """Lambda by the error function: Smith 1967 for Gaussian slopes."""
+    t = slope * math.tan(theta)
+    nu = 1 / (math.sqrt(2) * t)
+    return (math.exp(-nu * nu) / (nu * math.sqrt(math.pi)) - math.erfc(nu)) / 2
+
+
+def weights(brdf, degrees, draws):
+    setting = laws.SamplingSetup.of(brdf, math.radians(degrees))
+    with torch.no_grad():
+        return setting.draw(draws, torch.Generator().manual_seed(0)).weight[:, 0]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import torch
-from helpers.heightfields import F64, f64, held, rotation, vectors
+from helpers.heightfields import F64, UNCORRELATED, f64, held, rotation, vectors
 from torch.testing import assert_close
 
 from torchbrdf import (
@@ -13,7 +13,6 @@ from torchbrdf import (
     AnisotropicGaussianHeightfield,
     Cosines,
     GaussianHeightfield,
-    HeightfieldConstants,
     anisotropic_gaussian_heightfield,
     any_tangent,
     rms_slope_from_sigma,
@@ -21,9 +20,6 @@ from torchbrdf import (
 )
 from torchbrdf.models.heightfield.visibility import facet_masking, independence, joint_masking, ray
 from torchbrdf.testing import random_directions
-
-# A turn so fast that two rays know nothing of each other: l = 1.
-UNCORRELATED = HeightfieldConstants(level=0.5, grazing=0.3, turn=1e9, grazing_turn=0.0)
 
 
 @pytest.mark.parametrize("sigma", [0.1, 0.5, 1.2])

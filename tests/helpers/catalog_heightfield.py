@@ -1,7 +1,6 @@
 """The rows of the random heightfields."""
 
 from helpers.materials import Model, brushed, colour, number
-
 from torchbrdf import AnisotropicGaussianHeightfield, FastGaussianHeightfield, GaussianHeightfield, fixed
 
 # The masking of two rays has a kink where they coincide, which no panel's end follows off the plane of the view.
