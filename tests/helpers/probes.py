@@ -1,4 +1,4 @@
-"""What the tests of the other models ask with: float64 numbers, albedos by quadrature, a few directions."""
+"""What tests of models ask with: float64 numbers, albedos by quadrature, a few directions, seeds."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The share of light that a model reflects, against another quadrature."""
+"""What every BRDF offers: the share of light that it reflects, against another quadrature."""
 
 import math
 

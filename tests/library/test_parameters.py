@@ -1,4 +1,4 @@
-"""Material parameters: domains, storage, converters; and sums of models."""
+"""Material parameters: domains, storage, converters."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The ladder: its reference is the converged model, its errors those of the sheet, its table says what was measured."""
+"""The ladder: its errors are those of the sheet, its table says what was measured, models of users join it."""
 
 import json
 import math

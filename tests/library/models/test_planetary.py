@@ -1,7 +1,4 @@
-"""What the sheet states of the rough diffuse and planetary models, by other forms and by integrals.
-
-The golden values are in test_golden, glossy and layered models in test_layered_and_glossy.
-"""
+"""Lommel-Seeliger, Lambert spheres and Hapke by other forms and by integrals. Golden values are in laws/test_golden."""
 
 import math
 

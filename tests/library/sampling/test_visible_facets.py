@@ -1,4 +1,4 @@
-"""Facets drawn in proportion to the area that a view sees of them."""
+"""Facets drawn in proportion to the area that a view sees of them: densities by differences, weights."""
 
 import math
 

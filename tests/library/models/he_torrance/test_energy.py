@@ -1,4 +1,4 @@
-"""Energy, the averaged specular part and sampling of the He-Torrance model; what the module says and refuses."""
+"""What a He-Torrance surface returns: energy, its quadrature, and Monte Carlo."""
 
 import math
 

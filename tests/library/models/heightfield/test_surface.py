@@ -1,4 +1,4 @@
-"""The reference of random heightfields: golden values, traced surfaces, limits, derivatives."""
+"""The reference of random heightfields: traced surfaces, limits, derivatives, draws."""
 
 import math
 

@@ -1,6 +1,4 @@
-"""One slope angle: azimuth means against adaptive quadrature of the integrand written from the paper's vectors and
-strips.
-"""
+"""One slope angle: the azimuth mean of direct light against adaptive quadrature."""
 
 import pytest
 from helpers.facet_means import CASES, azimuth_mean, facets, plane_and_slope

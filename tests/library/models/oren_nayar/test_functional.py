@@ -1,6 +1,6 @@
-"""Both Oren-Nayar approximations against the paper's own trigonometry and against golden values.
+"""Oren and Nayar's functional model against the paper's own trigonometry and golden values; where angles lose digits.
 
-Golden values: tests/data/README.md says where they come from.
+Golden values: tests/data/README.md says where they come from. Tables over both approximations are here, too.
 """
 
 import math

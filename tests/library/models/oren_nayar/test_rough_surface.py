@@ -1,4 +1,4 @@
-"""The exact rough surface: golden values, small sigma, derivatives, and its anisotropic and tabulated kin."""
+"""The exact rough surface: a tabulated Gaussian, a white furnace, what is refused, what is known to be wrong."""
 
 import math
 
