@@ -67,7 +67,7 @@ def test_truth_comes_back_or_the_status_says_why_not(model):
 
 
 def test_rows_that_are_told_apart_by_nothing_are_rows():
-    from catalog import MODELS
+    from helpers.catalog import MODELS
 
     assert set(AS_ONE) <= {m.name for m in MODELS}
 
