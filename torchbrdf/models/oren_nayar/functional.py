@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf.directions import Cosines
+from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
@@ -39,9 +40,18 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
     """
     ALBEDO.check("oren_nayar: albedo", albedo)
     ROUGHNESS.check("oren_nayar: sigma", sigma)
-    coefficients = direct_coefficients(albedo, sigma) + interreflection_coefficients(albedo, sigma)
-    f = sum(c * t[..., None] for c, t in zip(coefficients.unbind(-1), geometry_terms(cosines), strict=True))
-    return cosines.zero_below_horizon(torch.as_tensor(f))
+    direct, bounced = ((field * cosines.lit)[..., None] for field in fields(cosines, sigma))
+    albedo = torch.atleast_1d(albedo)
+    return albedo * (direct + albedo * bounced)
+
+
+def fields(cosines: Cosines, sigma: Tensor, *, c3: bool = True) -> tuple[Tensor, Tensor]:
+    """Light reflected once and twice by white facets, (27) and (28), each (...). [1/sr]"""
+    _, along, across, bounce = geometry_terms(cosines, c3=c3)
+    s2 = sigma * sigma
+    slope = s2 / (math.pi * (s2 + 0.09))
+    direct = 1 / math.pi - (0.5 / math.pi) * s2 / (s2 + 0.33) + slope * (0.45 * along + 0.125 * across)
+    return direct, (0.17 / math.pi) * s2 / (s2 + 0.13) * (1 - bounce)
 
 
 def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -86,7 +96,7 @@ def interreflection_coefficients(albedo: Tensor, sigma: Tensor) -> Tensor:
 
 
 @final
-class OrenNayar(CltcSampled, LinearBRDF):
+class OrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
     """Functional approximation as a module; see `oren_nayar` for equation, units and deviations.
 
     Args:
@@ -121,6 +131,17 @@ class OrenNayar(CltcSampled, LinearBRDF):
 
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
+
+    def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        parts = zip(self._parts.values(), fields(cosines, self.sigma, c3=self.c3), strict=True)
+        return tuple(field for included, field in parts if included)
+
+    def reflected(self, *fields: Tensor) -> Tensor:
+        albedo = torch.atleast_1d(self.albedo)
+        if not self._parts["interreflection"]:
+            return albedo * fields[0]
+        bounced = albedo * fields[-1]
+        return albedo * (fields[0] + bounced if self._parts["direct"] else bounced)
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return geometry_terms(cosines, c3=self.c3)
