@@ -16,8 +16,9 @@ lint: .venv/ready
 	$(BIN)/pyright
 
 bench: .venv/ready
-	$(BIN)/python examples/03_accuracy_vs_time.py --output output
-	$(BIN)/python examples/03_accuracy_vs_time.py --output output --series --points 131072
+	$(BIN)/python examples/benchmarks/ladder.py --output output
+	$(BIN)/python examples/benchmarks/series.py --output output --points 131072
+	$(BIN)/python examples/benchmarks/cost_of_models.py
 
 clean:
 	rm -rf .venv build output *.egg-info .pytest_cache .ruff_cache

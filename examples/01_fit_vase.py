@@ -76,7 +76,7 @@ def main() -> None:
         "Photographs made by the exact model with all bounces (sigma 40 deg, rho 0.7); Lambert and the model, fitted"
     )
     path = args.output / "vase_fit.png"
-    fit_figure(path, surface, photographs, renderings, ["light 0 deg", "light 20 deg"], title=title)
+    fit_figure(surface, photographs, renderings, ["light 0 deg", "light 20 deg"], title=title).savefig(path)
     print(f"\nFigure: {path}")
 
 

@@ -14,11 +14,10 @@ from inverse.files import (
     read_merl,
     read_optical_constants,
     read_stack,
-    usable,
     write_image,
     write_stack,
 )
-from inverse.fitting import FitError, FitResult, bootstrap, fit, fit_measurements, weighted_reflectance
+from inverse.fitting import FitError, FitResult, bootstrap, fit, fit_measurements, usable, weighted_reflectance
 from inverse.planning import Effect, Plan, PlannedFit, everything, plan
 from inverse.profiles import belly_row, cross_section, peak_position
 from inverse.scene import (
@@ -29,9 +28,11 @@ from inverse.scene import (
     Environment,
     Light,
     Point,
+    Rays,
     Scene,
     Sensor,
     SimplerLight,
+    StoredLight,
     Surface,
     cuboid,
     cylinder,
@@ -78,12 +79,14 @@ __all__ = [
     "Plane",
     "PlannedFit",
     "Point",
+    "Rays",
     "Revolution",
     "Scene",
     "Sensor",
     "SimplerLight",
     "Solid",
     "Sphere",
+    "StoredLight",
     "Surface",
     "belly_row",
     "bootstrap",

@@ -11,13 +11,14 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from inverse.files import read_stack, usable, write_stack
-from inverse.fitting import FitError, bootstrap, fit
+from inverse.files import read_stack, write_stack
+from inverse.fitting import FitError, bootstrap, fit, usable
 from inverse.scene import Distant, Scene, Sensor, cylinder, plane, sphere, vase
 from inverse.transport import render
 from torchbrdf import BRDF, Lambert, OrenNayar, QualitativeOrenNayar, fixed
 
 _ROUGH = {"qualitative": QualitativeOrenNayar, "oren-nayar": OrenNayar}
+_EXPOSURE = "image value per unit radiance; with pi, white that faces a light of irradiance 1 is full scale"
 _SHAPES = {"vase": vase, "sphere": sphere, "cylinder": cylinder, "plane": plane}
 
 
@@ -49,7 +50,7 @@ def _parser() -> argparse.ArgumentParser:
 def _add_fit(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_fit)
     add = parser.add_argument
-    add("folder", help="images, mask, lights.txt and geometry.txt, as `pydoc inverse.files.stacks` describes")
+    add("folder", help="images and what is known of them, as `pydoc inverse.files.stacks` describes")
     add("--model", choices=["lambert", *_ROUGH], default="oren-nayar")
     add("--albedo", choices=["single", "per-pixel"], default="single")
     add("--geometry", metavar="LINE", help='instead of geometry.txt, such as "sphere 244.5 144.5 108"')
@@ -60,7 +61,7 @@ def _add_fit(parser: argparse.ArgumentParser) -> None:
     add("--limb", type=float, default=70.0, help="leave out points seen at more than this [deg] (%(default)s)")
     add("--highlight", type=float, default=0.0, help="leave out points this close to mirroring the light [deg]")
     add("--shadow", type=float, default=80.0, help="leave out points lit at more than this [deg] (%(default)s)")
-    _add_exposure(parser)
+    add("--exposure", type=float, help=f"{_EXPOSURE} (that of the folder's stack.json; pi where it has none)")
     add("--free-exposure", action="store_true", help="fit the exposure of each image after the first")
     add("--free-ambient", action="store_true", help="fit a constant added to each image")
     add("--starts", type=int, default=1, help="number of starting points (%(default)s)")
@@ -82,15 +83,9 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
     add("--size", type=int, default=256, help="rows and columns (%(default)s)")
     add("--noise", type=float, default=0.0, help="standard deviation, share of full scale (%(default)s)")
     add("--seed", type=int, default=0, help="of the noise (%(default)s)")
-    _add_exposure(parser)
+    add("--exposure", type=float, default=math.pi, help=f"{_EXPOSURE} (pi)")
+    add("--overwrite", action="store_true", help="replace an older stack in the output folder")
     add("--json", action="store_true", help="print JSON")
-
-
-def _add_exposure(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--exposure", type=float, default=math.pi,
-        help="image value per unit radiance (pi: white that faces a light of irradiance 1 is full scale)",
-    )  # fmt: skip
 
 
 def _fit(options: argparse.Namespace) -> dict[str, Any]:
@@ -98,7 +93,10 @@ def _fit(options: argparse.Namespace) -> dict[str, Any]:
         options.folder, images=options.images, mask=options.mask, lights=options.lights, geometry=options.geometry,
         color="srgb" if options.srgb else "linear", dtype=torch.float64,
     )  # fmt: skip
-    scene = replace(photos.scene, sensor=Sensor(exposure=options.exposure))
+    scene = photos.scene
+    if options.exposure is not None or not photos.sensor_stated:
+        exposure = math.pi if options.exposure is None else options.exposure
+        scene = replace(scene, sensor=replace(scene.sensor, exposure=exposure))
     valid = usable(scene, limb=options.limb, highlight=options.highlight, shadow=options.shadow)
     channels = photos.images.shape[-1]
     points = int(scene.surface.mask.sum())
@@ -133,7 +131,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
     model = _model(options.model, *(fixed(k) for k in (torch.tensor(options.albedo, dtype=torch.float64), sigma)))
     with torch.no_grad():
         images = sensor.expose(render(scene, model), torch.Generator().manual_seed(options.seed))
-    write_stack(options.output, images, scene)
+    write_stack(options.output, images, scene, overwrite=options.overwrite)
     report = {"folder": options.output, "images": len(images), "rows": options.size, "columns": options.size}
     report |= {"clipped": (images >= 1).double().mean().item()}
     return report | {"table": f"{len(images)} images of {options.size} x {options.size} pixels in {options.output}"}

@@ -1,31 +1,30 @@
-"""Figures. Needs matplotlib (the `plots` extra)."""
+"""Figures of fits, returned: `figure.savefig(path)` is the caller's. Needs matplotlib (the `plots` extra).
+
+No pyplot: nothing here chooses a backend, opens a window or keeps a figure alive.
+"""
 
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 
-import matplotlib
-import matplotlib.pyplot as plt
 import torch
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from torch import Tensor
 
 from inverse.profiles import cross_section
 from inverse.scene import Scene, Surface, pixel_average
 
-matplotlib.use("Agg")  # files only: no display is needed
-
 _LINES = ("tab:red", "tab:blue", "tab:green", "tab:purple")
 
 
 def fit_figure(
-    path: Path | str,
     surface: Surface,
     photographs: Tensor,
     renderings: dict[str, Tensor],
     lights: Sequence[str],
     *,
     title: str,
-) -> None:
+) -> Figure:
     """Photographs and renderings side by side, and their cross-sections below.
 
     Args:
@@ -35,7 +34,7 @@ def fit_figure(
     """
     images = min(len(photographs), 2)
     columns = 1 + len(renderings)
-    figure = plt.figure(figsize=(3.0 * columns * images, 7.2), layout="constrained")
+    figure = Figure(figsize=(1.8 * columns * images, 5.4), dpi=100, layout="constrained")
     figure.suptitle(title, fontsize=11)
     grid = figure.add_gridspec(2, columns * images, height_ratios=(1.0, 1.05))
     for k in range(images):
@@ -49,13 +48,10 @@ def fit_figure(
         axis = figure.add_subplot(grid[1, k * columns : (k + 1) * columns])
         _plot_cross_section(axis, surface, photographs[k], {name: stack[k] for name, stack in renderings.items()})
         axis.set_title(f"({'ab'[k]}) cross-section of the belly, {lights[k]}", fontsize=10)
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    return figure
 
 
-def residual_figure(
-    path: Path | str, scene: Scene, photographs: Tensor, renderings: dict[str, Tensor], valid: Tensor
-) -> None:
+def residual_figure(scene: Scene, photographs: Tensor, renderings: dict[str, Tensor], valid: Tensor) -> Figure:
     """What each model leaves unexplained: in one image, and over all images against the angle of the light.
 
     Args:
@@ -63,9 +59,8 @@ def residual_figure(
         renderings: label -> images of the same shape, in the same units.
         valid: the samples that were fitted, bool (image, rows, columns); the others are left white.
     """
-    figure, axes = plt.subplots(
-        1, len(renderings) + 2, figsize=(3.2 * (len(renderings) + 2), 3.2), layout="constrained"
-    )
+    figure = Figure(figsize=(3.2 * (len(renderings) + 2), 3.2), dpi=100, layout="constrained")
+    axes = figure.subplots(1, len(renderings) + 2)
     seen = scene.surface.coverage() > 0
     window = tuple(slice(int(k.nonzero()[0]), int(k.nonzero()[-1]) + 1) for k in (seen.any(1), seen.any(0)))
     axes[0].imshow(photographs[0].mean(-1)[window].numpy(), cmap="gray")
@@ -88,20 +83,19 @@ def residual_figure(
     axes[-1].title.set_fontsize(10)
     axes[-1].axhline(0, color="k", linewidth=0.5)
     axes[-1].legend(fontsize=8)
-    figure.savefig(path, dpi=100)
-    plt.close(figure)
+    return figure
 
 
 def measurement_figure(
-    path: Path | str, curves: dict[str, dict[str, tuple[Tensor, Tensor]]], shares: dict[str, dict[str, float]]
-) -> None:
+    curves: dict[str, dict[str, tuple[Tensor, Tensor]]], shares: dict[str, dict[str, float]]
+) -> Figure:
     """Measured and fitted reflectance along a line of directions, and what each model leaves unexplained.
 
     Args:
         curves: title -> label -> (viewing angle [deg], f_r [1/sr]); the first label's are drawn as dots.
         shares: model -> material or part of it -> residual in percent.
     """
-    figure = plt.figure(figsize=(3.6 * len(curves), 4 + 0.27 * len(shares)), layout="constrained")
+    figure = Figure(figsize=(3.6 * len(curves), 4 + 0.27 * len(shares)), dpi=80, layout="constrained")
     grid = figure.add_gridspec(2, len(curves), height_ratios=(4, 0.27 * len(shares)))
     for column, (title, lines) in enumerate(curves.items()):
         axis = figure.add_subplot(grid[0, column])
@@ -122,8 +116,7 @@ def measurement_figure(
     axis.set_xticks(range(table.shape[1]), list(next(iter(shares.values()))), fontsize=8)
     axis.set_yticks(range(table.shape[0]), list(shares))
     axis.set_title("residual rms, in percent of the rms of the data", fontsize=10)
-    figure.savefig(path, dpi=80)
-    plt.close(figure)
+    return figure
 
 
 def _light_angle(scene: Scene, image: int) -> Tensor:
@@ -135,15 +128,13 @@ def _light_angle(scene: Scene, image: int) -> Tensor:
     return torch.rad2deg((normals * direction.unflatten(0, normals.shape[:2])).sum(-1).clamp(-1, 1).acos())
 
 
-def _plot_cross_section(axis, surface: Surface, photograph: Tensor, renderings: dict[str, Tensor]) -> None:
+def _plot_cross_section(axis: Axes, surface: Surface, photograph: Tensor, renderings: dict[str, Tensor]) -> None:
     position, brightness = cross_section(photograph, surface)
     every = max(1, len(position) // 100)
     axis.plot(position[::every], brightness[::every], "k.", markersize=3, label="photograph")
     for colour, (label, image) in zip(_LINES, renderings.items(), strict=False):
         axis.plot(*cross_section(image, surface), color=colour, label=label)
-    axis.set(
-        xlabel="position across the vase, left limb to right limb", ylabel="brightness (full scale = 1)", xlim=(-1, 1)
-    )
+    axis.set(xlabel="position, left limb (-1) to right limb (1)", ylabel="brightness (full scale = 1)", xlim=(-1, 1))
     axis.set_ylim(bottom=0)
     axis.legend(fontsize=9, loc="lower center")
     axis.grid(alpha=0.3)

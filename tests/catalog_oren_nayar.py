@@ -146,7 +146,7 @@ OREN_NAYAR = [
     ),
     Model(
         "single slope",
-        lambda dtype: SingleSlopeVCavities(albedo=colour(dtype), slope=number(0.8, dtype), order=4),
+        lambda dtype: SingleSlopeVCavities(albedo=colour(dtype), slope=number(0.8, dtype), order=8),
         captured=False,
         integral=KINKED,
         float32=STEEP,

@@ -10,16 +10,16 @@ Conventions, stated once:
 - Below the horizon f_r is 0 with zero gradient.
 """
 
-from torchbrdf.brdf import BRDF
+import importlib
+import warnings
+
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import (
     Cosines,
     any_tangent,
 )
 from torchbrdf.effects import (
     EFFECTS,
-    Option,
-    compact,
-    options,
     simulated,
 )
 from torchbrdf.facets import (
@@ -69,6 +69,20 @@ from torchbrdf.models.he_torrance.polarised import (
 from torchbrdf.models.he_torrance.reflectance import (
     he_torrance,
     specular_reflectivity,
+)
+from torchbrdf.models.heightfield.roughness import (
+    rms_slope_from_beckmann_alpha,
+    rms_slope_from_sigma,
+    sigma_from_rms_slope,
+)
+from torchbrdf.models.heightfield.surface import (
+    GaussianHeightfield,
+    gaussian_heightfield,
+)
+from torchbrdf.models.heightfield.visibility import (
+    MESHED_HEIGHTFIELD,
+    SMOOTH_HEIGHTFIELD,
+    HeightfieldConstants,
 )
 from torchbrdf.models.lambert import (
     Lambert,
@@ -169,6 +183,8 @@ from torchbrdf.slopes import (
     tabulated_weights,
 )
 
+__version__ = "0.2.0"
+
 __all__ = [  # noqa: RUF022 - in plain order
     "ACRYLIC",
     "ALUMINIUM",
@@ -198,9 +214,11 @@ __all__ = [  # noqa: RUF022 - in plain order
     "FujiiOrenNayar",
     "GGX",
     "GOLD",
+    "GaussianHeightfield",
     "HalfVector",
     "Hapke",
     "HeTorrance",
+    "HeightfieldConstants",
     "ImageBRDF",
     "Interval",
     "Lambert",
@@ -208,6 +226,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "LinearBRDF",
     "LommelSeeliger",
     "MAGNESIUM_OXIDE",
+    "MESHED_HEIGHTFIELD",
     "MaxCosinePhong",
     "MeasuredIndex",
     "Minnaert",
@@ -221,6 +240,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "QualitativeOrenNayar",
     "RoughSurface",
     "SILVER",
+    "SMOOTH_HEIGHTFIELD",
     "Sample",
     "Schlick",
     "SellmeierIndex",
@@ -234,7 +254,6 @@ __all__ = [  # noqa: RUF022 - in plain order
     "any_tangent",
     "burley",
     "coherency",
-    "compact",
     "conductor",
     "conductor_amplitudes",
     "dielectric",
@@ -244,17 +263,19 @@ __all__ = [  # noqa: RUF022 - in plain order
     "f0_from_index",
     "fast_rough_surface",
     "fixed",
+    "gaussian_heightfield",
     "gaussian_weights",
     "he_torrance",
     "he_torrance_polarised",
     "is_per_texel",
     "lambert_sphere_fast",
     "minnaert",
-    "options",
     "oren_nayar",
     "phong_radiance",
     "polarised_specular_reflectivity",
     "qualitative",
+    "rms_slope_from_beckmann_alpha",
+    "rms_slope_from_sigma",
     "rusinkiewicz_angles",
     "sample_slope",
     "schlick",
@@ -262,6 +283,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "sigma_from_beckmann_alpha",
     "sigma_from_degrees",
     "sigma_from_mean_slope",
+    "sigma_from_rms_slope",
     "simulated",
     "smith_correlated",
     "smith_separable",
@@ -272,3 +294,16 @@ __all__ = [  # noqa: RUF022 - in plain order
     "v_cavities",
     "v_cavity_masking",
 ]
+
+_MOVED = {"sampling_laws": "torchbrdf.testing", "accuracy_series": "torchbrdf.accuracy"}
+
+
+def __getattr__(name: str) -> object:
+    """Names of version 0.1, for one more version."""
+    if name in _MOVED:
+        warnings.warn(f"torchbrdf.{name} is now part of {_MOVED[name]}", DeprecationWarning, stacklevel=2)
+        return importlib.import_module(_MOVED[name])
+    if name != "options":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn("torchbrdf.options(model) is now model.stand_ins()", DeprecationWarning, stacklevel=2)
+    return lambda model: model.stand_ins()

@@ -15,6 +15,8 @@ from torch import Tensor
 _ANGLE_DEGREE = {torch.float64: 20, torch.float32: 9}
 # A normalised vector is of unit length to a few rounding errors; data stored with six digits is not.
 _UNIT_TOLERANCE_IN_EPS = 64
+# sin^2(phi/2) below which an azimuth from dot products is rounding: some thousand eps in float64, ten in float32.
+_TIP = {torch.float64: 1e-12, torch.float32: 1e-6}
 
 
 def _angle_over_sine_polynomial(degree: int) -> tuple[float, ...]:
@@ -87,6 +89,11 @@ def cross(a: Tensor, b: Tensor) -> Tensor:
     return torch.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), -1)
 
 
+def length(vector: Tensor) -> Tensor:
+    """Length (...) of vectors (..., 3), with zero gradient where it is 0."""
+    return safe_sqrt(dot(vector, vector))
+
+
 def safe_sqrt(x: Tensor) -> Tensor:
     """sqrt(x), and 0 with zero gradient where rounding left x at or below 0."""
     empty = x <= 0
@@ -100,6 +107,24 @@ def sine(cosine: Tensor) -> Tensor:
     return positive(square).sqrt() * square.detach().clamp(min=0).sign()
 
 
+def soft_sqrt(x: Tensor) -> Tensor:
+    """sqrt(x) for x >= 0 with all derivatives finite, 0 at x = 0 where x has none itself: one pass, for large arrays.
+
+    The smallest normal number is added below the root, which changes no digit of a root above 1e-130 (float32: 1e-15).
+    """
+    return (x + torch.finfo(x.dtype).tiny).sqrt()
+
+
+def half_turn_sine(cosine: Tensor, sine: Tensor) -> Tensor:
+    """sin(phi/2) (...) in [0, 1] from cosine and sine of an azimuth: no digits are lost at 0, a cone's tip.
+
+    Zero gradient where sin^2(phi/2) cannot be told from 0 by the cosine alone; the value is kept.
+    """
+    squared = ((1 - cosine) * (1 - cosine) + sine * sine) / 4
+    tip = squared <= _TIP[squared.dtype]
+    return torch.where(tip, safe_sqrt(squared.detach()), squared.masked_fill(tip, 1.0).sqrt())
+
+
 def safe_divide(numerator: Tensor, denominator: Tensor, *, where: Tensor) -> Tensor:
     """numerator / denominator where the mask holds, else 0 with zero gradient; masked before dividing."""
     return (numerator / denominator.masked_fill(~where, 1.0)).masked_fill(~where, 0.0)
@@ -107,8 +132,12 @@ def safe_divide(numerator: Tensor, denominator: Tensor, *, where: Tensor) -> Ten
 
 def safe_atan2(y: Tensor, x: Tensor) -> Tensor:
     """Polar angle of (x, y) in (-pi, pi]; 0 with zero gradient at the origin, where it has no meaning. [rad]"""
-    origin = (x == 0) & (y == 0)
-    return torch.atan2(y.masked_fill(origin, 0.0), x.masked_fill(origin, 1.0))
+    # The larger coordinate is divided out, which the angle does not notice: the derivative has the squares below it,
+    # and they may underflow.
+    scale = torch.maximum(x.abs(), y.abs()).detach()
+    origin = scale < torch.finfo(scale.dtype).tiny
+    scale = scale.masked_fill(origin, 1.0)
+    return torch.atan2((y / scale).masked_fill(origin, 0.0), (x / scale).masked_fill(origin, 1.0))
 
 
 def arcsec(x: Tensor) -> Tensor:
@@ -127,6 +156,11 @@ def arccsc(x: Tensor) -> Tensor:
 def sinc(x: Tensor) -> Tensor:
     """sin(x)/x, 1 at 0, smooth to every order in reverse and forward mode."""
     return torch.sinc(x / math.pi)
+
+
+def positive_part(x: Tensor) -> Tensor:
+    """max(x, 0) with the derivative 1/2 at 0, the mean of both sides: what |x| beside it takes for its own."""
+    return torch.maximum(x, x.new_zeros(()))
 
 
 def positive(x: Tensor) -> Tensor:
@@ -172,6 +206,13 @@ def safe_power(base: Tensor, exponent: Tensor) -> Tensor:
     """base^exponent for base > 0; else 0 with zero gradient, and 1 where the exponent is 0."""
     empty = base <= 0
     value = base.masked_fill(empty, 1.0) ** exponent
+    return torch.where(empty, (exponent == 0).to(value), value)
+
+
+def power_of_complement(deficit: Tensor, exponent: Tensor) -> Tensor:
+    """(1 - deficit)^exponent for 0 <= deficit < 1, with all digits of a small deficit; beyond as `safe_power`."""
+    empty = deficit >= 1
+    value = (exponent * torch.log1p(-deficit.masked_fill(empty, 0.0))).exp()
     return torch.where(empty, (exponent == 0).to(value), value)
 
 

@@ -2,7 +2,8 @@
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import torch
@@ -10,7 +11,7 @@ from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
 from torchbrdf._numerics import safe_sqrt
-from torchbrdf.directions import Cosines
+from torchbrdf.directions import Cosines, any_tangent, orthonormal_tangent
 from torchbrdf.parameters import Parametric
 from torchbrdf.sampling import Sampled
 
@@ -24,7 +25,12 @@ class BRDF(Sampled, Parametric, ABC):
     Subclasses implement `evaluate_components`, and `propose` with `density` where the sampling of `Sampled` is not
     good enough. Sums and multiples are BRDFs again:
     `0.7 * OrenNayar() + 0.3 * Lambert()` has two trainable weights.
+
+    Attributes:
+        anisotropic: whether reflectance depends on a direction along the surface, the tangent, which is then needed.
     """
+
+    anisotropic: bool = False
 
     def forward(
         self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
@@ -42,8 +48,22 @@ class BRDF(Sampled, Parametric, ABC):
     ) -> Cosines:
         """What the model reads of the directions; raises ValueError where it misses a tangent."""
         if self.anisotropic and tangent is None:
-            raise ValueError(self.missing_tangent())
+            raise ValueError(self._missing_tangent())
         return Cosines.of(normal, light, view, tangent=tangent, normalize=normalize)
+
+    def tangent_of(self, normal: Tensor, tangent: Tensor | None) -> Tensor:
+        """Unit tangent (..., 3) across the normal: the given one's, or any for a model to which all are alike.
+
+        Raises ValueError where an anisotropic model misses a tangent.
+        """
+        if tangent is not None:
+            return orthonormal_tangent(normal, tangent)
+        if self.anisotropic:
+            raise ValueError(self._missing_tangent())
+        return any_tangent(normal)
+
+    def _missing_tangent(self) -> str:
+        return f"{type(self).__name__} is anisotropic and needs a tangent: pass tangent=... (..., 3)."
 
     def components(
         self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
@@ -92,6 +112,16 @@ class BRDF(Sampled, Parametric, ABC):
             cosines = Cosines.from_products(cos_light, cos_view, phase)
         return (self.evaluate(cosines) * weight[..., None]).sum((0, 1))
 
+    def stand_ins(self) -> "dict[str, list[Option]]":
+        """What could be left out of this model, and by which cheaper model: none, unless a model says so.
+
+        By group: an option of a group replaces another of the same, and options of different groups add up. Of each
+        group the cheapest comes first; groups that drop parts of a sum come last. `torchbrdf.effects` holds names of
+        effects, and a model may add its own. Whether anything may be left out of a scene is measured there
+        (`inverse.plan`), what it costs and errs by in `torchbrdf.accuracy`.
+        """
+        return {}
+
     def __mul__(self, weight: Tensor | float) -> "WeightedSum":
         from torchbrdf.mixture import WeightedSum  # deferred: a sum is a BRDF
 
@@ -105,6 +135,23 @@ class BRDF(Sampled, Parametric, ABC):
     def __radd__(self, other: object) -> "BRDF":
         # sum([a, b]) starts from 0
         return self if other == 0 else NotImplemented
+
+
+@dataclass(frozen=True)
+class Option:
+    """A material that simulates less than a given one.
+
+    Attributes:
+        choice: what is simulated instead.
+        skips: the effects left out.
+        model: the whole material with the stand-in in it; values, and what is held fixed, are the given model's.
+        renamed: of parameters of `model` by path ("parts.0.sigma"), the path in the given model where it differs.
+    """
+
+    choice: str
+    skips: tuple[str, ...]
+    model: BRDF
+    renamed: Mapping[str, str] = field(default_factory=dict)
 
 
 def total(values: Iterable[Tensor]) -> Tensor:

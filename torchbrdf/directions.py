@@ -17,6 +17,7 @@ from torchbrdf._numerics import (
     dot_of,
     holds,
     horizon,
+    length,
     positive,
     safe_sqrt,
     sine,
@@ -123,6 +124,22 @@ class Cosines:
         return brdf * self.lit[..., None]
 
     @_computed_once
+    def half_phase(self) -> tuple[Tensor, Tensor]:
+        """Sine and cosine of half the angle g between light and view, each (...); zero subgradient where 0. [-]
+
+        |light - view|/2 and |light + view|/2 where the vectors are known: all digits, also of a small angle. The dot
+        product alone has lost half of them.
+        """
+        if self.vectors is None:
+            return safe_sqrt((1 - self.phase) / 2), safe_sqrt((1 + self.phase) / 2)
+        _, light, view = self.vectors
+        below = ~self.above_horizon
+        return (
+            (length(light - view) / 2).masked_fill(below, 0.0),
+            (length(light + view) / 2).masked_fill(below, 1.0),
+        )
+
+    @_computed_once
     def azimuth_sine(self) -> Tensor:
         """sin(alpha) sin(beta) |sin(dphi)| (...): |normal . (light x view)|; zero subgradient where it is 0.
 
@@ -220,7 +237,8 @@ def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
 def any_tangent(normal: Tensor) -> Tensor:
     """A unit vector (..., 3) perpendicular to the unit normal, smooth except where normal_z changes sign.
 
-    Source: Duff et al. 2017, Building an Orthonormal Basis, Revisited.
+    Source: Duff, Burgess, Christensen, Hery, Kensler, Liani & Villemin 2017, "Building an orthonormal basis,
+        revisited", Journal of Computer Graphics Techniques 6(1).
     """
     x, y, z = normal.unbind(-1)
     sign = torch.where(z < 0, -torch.ones_like(z), torch.ones_like(z))
@@ -237,14 +255,14 @@ def _check_shapes(vectors: dict[str, Tensor]) -> None:
         if v.ndim == 0 or v.shape[-1] != 3:
             raise ValueError(f"{name} must have shape (..., 3); found {tuple(v.shape)}.")
     if len({v.dtype for v in vectors.values()}) > 1:
-        found = ", ".join(f"{name} {v.dtype}" for name, v in vectors.items())
-        raise TypeError(f"{_listed(vectors)} must share one dtype; found {found}.")
+        dtypes = ", ".join(f"{name} {v.dtype}" for name, v in vectors.items())
+        raise TypeError(f"{_listed(vectors)} must share one dtype; found {dtypes}.")
     shapes = [v.shape for v in vectors.values()]
     try:
         torch.broadcast_shapes(*shapes)
     except RuntimeError:
-        found = ", ".join(f"{name} {tuple(v.shape)}" for name, v in vectors.items())
-        raise ValueError(f"{_listed(vectors)} must broadcast; found {found}.") from None
+        given = ", ".join(f"{name} {tuple(v.shape)}" for name, v in vectors.items())
+        raise ValueError(f"{_listed(vectors)} must broadcast; found {given}.") from None
 
 
 def _listed(vectors: dict[str, Tensor]) -> str:

@@ -84,7 +84,8 @@ def v_cavity_masking(cosines: Cosines, half: HalfVector) -> Tensor:
 
     Returns: G (...), in (0, 1]. [-] 1 in the exact mirror direction.
     Deviations: the Oren-Nayar texts print Max for the outer bracket; the derivation, and energy, ask for Min.
-    Source: Torrance & Sparrow 1967; Oren & Nayar 1994, eq. (33).
+    Source: Torrance & Sparrow 1967, "Theory for off-specular reflection from roughened surfaces", DOI
+        10.1364/JOSA.57.001105; Oren & Nayar 1994, eqs. (33), (38) of the long version (`v_cavity`).
     """
     return geometric_attenuation(
         half.cos_light, half.cos_light, cos_light=cosines.light, cos_view=cosines.view, cos_facet=half.cos
@@ -153,7 +154,7 @@ def slope_area(half: HalfVector, *, sigma: Tensor) -> Tensor:
 
     Args:
         sigma: roughness (...). [rad] > 0
-    Source: Torrance & Sparrow 1967; slope-area convention of Oren & Nayar 1994.
+    Source: Torrance & Sparrow 1967 (`v_cavity_masking`); slope-area convention of Oren & Nayar 1994, eqs. (6), (26).
     """
     return (-0.5 * half.tilt_squared() / (sigma * sigma)).exp() / slope_area_norm(sigma)
 
@@ -161,7 +162,9 @@ def slope_area(half: HalfVector, *, sigma: Tensor) -> Tensor:
 def ggx_distribution(half: HalfVector, *, alpha: Tensor) -> Tensor:
     r"""Facets per area and solid angle, :math:`D = \frac{1}{\pi \alpha^2 (\sin^2/\alpha^2 + \cos^2)^2}` (...). [1/sr]
 
-    Source: Trowbridge & Reitz 1975; Walter et al. 2007.
+    Source: Trowbridge & Reitz 1975, "Average irregularity representation of a rough surface for ray reflection", DOI
+        10.1364/JOSA.65.000531; Walter, Marschner, Li & Torrance 2007, "Microfacet models for refraction through rough
+        surfaces", DOI 10.2312/EGWR/EGSR07/195-206, eq. (33).
     """
     return _ggx(half, half.sine_squared / (alpha * alpha), alpha * alpha)
 
@@ -179,7 +182,8 @@ def _ggx(half: HalfVector, stretched: Tensor, area: Tensor) -> Tensor:
 def beckmann_distribution(half: HalfVector, *, alpha: Tensor) -> Tensor:
     r"""Facets per area and solid angle, :math:`D = \frac{e^{-\tan^2/\alpha^2}}{\pi \alpha^2 \cos^4}` (...). [1/sr]
 
-    Source: Beckmann & Spizzichino 1963; Cook & Torrance 1982.
+    Source: Beckmann & Spizzichino 1963, The Scattering of Electromagnetic Waves from Rough Surfaces; Cook & Torrance
+        1982, "A reflectance model for computer graphics", DOI 10.1145/357290.357293.
     """
     return _beckmann(half, half.sine_squared / (alpha * alpha), alpha * alpha)
 

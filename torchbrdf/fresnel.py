@@ -32,7 +32,7 @@ def schlick(cos: Tensor, *, f0: Tensor) -> Tensor:
         f0: reflectance at normal incidence. [-] in [0, 1]
     Returns: F, shapes broadcast. [-]
     Deviations: a fit. Up to 0.05 from `dielectric` at eta = 1.5 (near 80 degrees), more for metals.
-    Source: Schlick 1994.
+    Source: Schlick 1994, "An inexpensive BRDF model for physically-based rendering", DOI 10.1111/1467-8659.1330233.
     """
     return f0 + (1 - f0) * fifth_power(1 - cos)
 
@@ -62,7 +62,8 @@ def dielectric(cos: Tensor, *, eta: Tensor) -> Tensor:
     Returns: F, shapes broadcast. [-] 1, with zero gradient, beyond the critical angle.
     Deviations: none. Both differences are written as products of eta^2 - 1, so that F keeps its digits
         for eta near 1.
-    Source: Fresnel 1823; Shirley et al., Fundamentals of Computer Graphics, ch. 25.
+    Source: Fresnel's equations, Born & Wolf 1999, Principles of Optics, DOI 10.1017/CBO9781139644181, section 1.5.2;
+        with g as in Cook & Torrance 1982, DOI 10.1145/357290.357293.
     """
     contrast = (eta - 1) * (eta + 1)
     g_squared = contrast + cos * cos
@@ -87,7 +88,7 @@ def conductor(cos: Tensor, *, eta: Tensor, k: Tensor) -> Tensor:
         eta, k: real and imaginary part of the relative index. [-] > 0, >= 0
     Returns: F, shapes broadcast. [-]
     Deviations: none; k = 0 is `dielectric`.
-    Source: Born & Wolf, Principles of Optics, ch. 14.
+    Source: Born & Wolf 1999, Principles of Optics, 7th edition, DOI 10.1017/CBO9781139644181, ch. 14.
     """
     sine_squared = ((1 - cos) * (1 + cos)).relu()
     a_squared, b_squared = _refracted_squares(cos, eta, k)
@@ -108,7 +109,7 @@ def conductor_amplitudes(cos: Tensor, *, eta: Tensor, k: Tensor) -> tuple[Tensor
     Returns: F_s and F_p, complex, shapes broadcast. [-] F_p = -F_s at c = 1: p turns with the ray, for a time factor
         exp(-i w t).
     Deviations: none. (|F_s|^2 + |F_p|^2)/2 is `conductor`.
-    Source: Born & Wolf, Principles of Optics, section 1.5.2 with ch. 14.
+    Source: Born & Wolf 1999, Principles of Optics, DOI 10.1017/CBO9781139644181, section 1.5.2 with ch. 14.
     """
     q = refracted_cosine(cos, eta, k)
     sine_squared = ((1 - cos) * (1 + cos)).relu()
@@ -142,7 +143,7 @@ def dielectric_average(*, eta: Tensor) -> Tensor:
     Raises: ValueError for eta outside [1, inf).
     Deviations: terms of size (eta - 1)^-2 cancel towards eta = 1. Computed in float64 whatever the dtype: relative
         error 1e-13 at 1.5, 1e-9 at 1.01; 0 at eta = 1.
-    Source: Walsh 1926.
+    Source: Walsh 1926, "The reflection factor of a polished glass surface for diffused light".
     """
     REFRACTIVE_INDEX.check("dielectric_average: eta", eta)
     matched = eta <= 1
@@ -169,10 +170,20 @@ class Fresnel(Parametric, ABC):
     def average(self) -> Tensor:
         """F under uniform light, the mean over 2 c dc (..., channel). [-]"""
 
+    def at_every_angle(self) -> "ConstantFresnel | None":
+        """Stand-in that reflects as at normal incidence; None where F is the same at every angle anyway."""
+        stored = next((t for t in (*self.parameters(), *self.buffers()) if t.is_floating_point()), torch.ones(()))
+        value = self(stored.new_ones(())).detach()
+        trained = any(p.requires_grad for p in self.parameters())
+        return ConstantFresnel(value=value if trained else fixed(value))
+
 
 @final
 class Perfect(Fresnel):
     """Reflects everything: F = 1."""
+
+    def at_every_angle(self) -> None:
+        return None
 
     def forward(self, cos: Tensor) -> Tensor:
         return torch.ones_like(cos)[..., None]
@@ -196,6 +207,9 @@ class ConstantFresnel(Fresnel):
 
     def average(self) -> Tensor:
         return torch.atleast_1d(self.value)
+
+    def at_every_angle(self) -> None:
+        return None
 
 
 @final

@@ -1,6 +1,14 @@
 """Complex refractive indices of a few materials over the wavelength, for `HeTorrance` and `Conductor`.
 
 The published numbers were read from the refractiveindex.info database (public domain, CC0).
+Sources:
+    Rakic 1995, "Algorithm for the determination of intrinsic optical constants of metal films: application to
+        aluminum", DOI 10.1364/AO.34.004755;
+    Johnson & Christy 1972, "Optical constants of the noble metals", DOI 10.1103/PhysRevB.6.4370;
+    Stephens & Malitson 1952, "Index of refraction of magnesium oxide", DOI 10.6028/jres.049.025;
+    Malitson 1965, "Interspecimen comparison of the refractive index of fused silica", DOI 10.1364/JOSA.55.001205;
+    Sultanova, Kasarova & Nikolov 2009, "Dispersion properties of optical polymers", DOI 10.12693/APhysPolA.116.585;
+    Schott 2017, data sheet of the optical glass N-BK7.
 """
 
 from dataclasses import dataclass

@@ -43,19 +43,19 @@ class Interval:
         if holds(inside):
             return
         finite = value[value.isfinite()]
-        found = f"min {finite.min():.6g}, max {finite.max():.6g}" if finite.numel() else "none is finite"
+        extent = f"min {finite.min():.6g}, max {finite.max():.6g}" if finite.numel() else "none is finite"
         opening = "(" if open_ends else "["
         closing = ")" if open_ends or math.isinf(self.high) else "]"
         unit = f" {self.unit}" if self.unit else ""
         remedy = " A trained value cannot sit on a bound: hold it there with fixed(...)." if open_ends else ""
         raise ValueError(
             f"{name} must lie in {opening}{self.low:.4g}, {self.high:.4g}{closing}{unit}; "
-            f"{int((~inside).sum())} of {inside.numel()} entries do not ({found}).{remedy}"
+            f"{int((~inside).sum())} of {inside.numel()} entries do not ({extent}).{remedy}"
         )
 
     def to_raw(self, value: Tensor) -> Tensor:
         """Unconstrained coordinate of a value inside the domain."""
-        if math.isinf(self.high):
+        if self.high == math.inf:
             return (value - self.low).log()
         return torch.logit((value - self.low) / (self.high - self.low))
 
@@ -63,7 +63,7 @@ class Interval:
         """Value inside the domain for any real number."""
         # At least 1-D inside: forward differentiation of "number * 0-d float32 tensor" yields float64.
         row = torch.atleast_1d(raw)
-        inside = row.exp() if math.isinf(self.high) else (self.high - self.low) * row.sigmoid()
+        inside = row.exp() if self.high == math.inf else (self.high - self.low) * row.sigmoid()
         return (self.low + inside).reshape(raw.shape)
 
 
@@ -204,14 +204,23 @@ def declared(module: nn.Module) -> Iterator[Constrained]:
 
 def trainable(module: nn.Module) -> dict[str, tuple[str, Interval | Simplex]]:
     """Trained parameters of a module and its children: readable path -> (path of the raw one, domain)."""
-    found = {}
+    trained = {}
     for prefix, child in module.named_modules():
         dot = f"{prefix}." if prefix else ""
         for entry in declared(child):
             raw = child._parameters.get(f"raw_{entry.name}")
             if raw is not None and raw.requires_grad:
-                found[dot + entry.name] = (f"{dot}raw_{entry.name}", entry.domain)
-    return found
+                trained[dot + entry.name] = (f"{dot}raw_{entry.name}", entry.domain)
+    return trained
+
+
+def paths(module: nn.Module) -> list[str]:
+    """Readable paths ("parts.0.sigma") of the declared parameters of a module and its children, trained or held."""
+    return [
+        f"{prefix}.{entry.name}" if prefix else entry.name
+        for prefix, child in module.named_modules()
+        for entry in declared(child)
+    ]
 
 
 def kept(module: Parametric, name: str) -> Tensor | fixed:

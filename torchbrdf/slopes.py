@@ -4,11 +4,12 @@ A rough surface is a weighted sum of single slopes: f = sum_k w_k f(theta_k). Th
 so that what depends on the geometry is computed once, and the weights are all that the roughness changes. Node 0 is the
 flat facet: it makes sigma = 0 exactly Lambert.
 
-Gaussian slopes, eq. (26) normalised for azimuth *means*:
+Gaussian slopes, Oren & Nayar 1994, eq. (26), normalised for azimuth *means*:
     w(theta) = exp(-theta^2 / 2 sigma^2) sin(theta) / Z(sigma) on [0, pi/2].
 sigma is the width of the truncated polar Gaussian, not the standard deviation of theta (for small sigma,
 E[theta^2] = 2 sigma^2).
-Source: Oren & Nayar 1994, eqs. (25), (26); `equations/oren_nayar.md`, section 6, for the normalisation.
+Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+    (1995, DOI 10.1007/BF01679684), eqs. (25), (26); `docs/equations/oren_nayar.md`, section 6, for the normalisation.
 """
 
 import math
@@ -104,7 +105,7 @@ def tabulated_weights(density: Tensor, *, nodes: int) -> Tensor:
 
 
 def gaussian_density(angle: Tensor, sigma: Tensor) -> Tensor:
-    """w(theta) of eq. (26) at slope angles (...) for sigma > 0 (...). [1/rad]"""
+    """w(theta) of Oren & Nayar 1994, eq. (26), at slope angles (...) for sigma > 0 (...). [1/rad]"""
     ratio = angle / sigma
     return torch.exp(-0.5 * ratio * ratio) * angle.sin() / (sigma * sigma * gaussian_moments(sigma)[0])
 

@@ -1,9 +1,10 @@
 """Masking and shadowing of one facet by its neighbour in a symmetric V-cavity.
 
 The assumption "cavities are symmetric V-grooves with Lambertian facets" enters the package here (which strip is lit,
-which is visible) and in `interreflection` (how the strips exchange light) and nowhere else. Source: Oren & Nayar 1994,
-long version, section 3 and eqs. (33)-(38), with the nesting of (38) repaired: lit and visible strip both end at the
-ridge, so their overlap is the *smaller* of the two.
+which is visible) and in `interreflection` (how the strips exchange light) and nowhere else.
+Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+    (1995, DOI 10.1007/BF01679684), section 3 and eqs. (33)-(38), with the nesting of (38) repaired: lit and visible
+    strip both end at the ridge, so their overlap is the *smaller* of the two.
 """
 
 import math
@@ -15,13 +16,14 @@ from torchbrdf._numerics import safe_divide
 
 
 def lit_fraction(cos_facet_light: Tensor, cos_light: Tensor, cos_facet: Tensor) -> Tensor:
-    """Fraction of a facet's width that the source reaches, eq. (35); by symmetry also the fraction that a viewer sees.
+    """Fraction of a facet's width that the source reaches; by symmetry also the fraction that a viewer sees.
 
     Args:
         cos_facet_light: <s, a>, facet normal and source (...). [-]
         cos_light: <s, n> (...). [-]
         cos_facet: <a, n> (...). [-]
     Returns: clamp(2 <s,n><a,n> / <s,a>) (...), 0 for a facet turned away. [-] in [0, 1]
+    Source: Oren & Nayar 1994, eq. (35).
     """
     return safe_divide(2 * cos_light * cos_facet, cos_facet_light, where=cos_facet_light > 0).clamp(0, 1)
 
@@ -29,8 +31,9 @@ def lit_fraction(cos_facet_light: Tensor, cos_light: Tensor, cos_facet: Tensor) 
 def geometric_attenuation(
     cos_facet_light: Tensor, cos_facet_view: Tensor, *, cos_light: Tensor, cos_view: Tensor, cos_facet: Tensor
 ) -> Tensor:
-    """Part of a facet's width that is lit and visible at once, eq. (38) repaired. All arguments and the result (...).
-    [-] in [0, 1]
+    """Part of a facet's width that is lit and visible at once. All arguments and the result (...). [-] in [0, 1]
+
+    Source: Oren & Nayar 1994, eq. (38) repaired.
     """
     lit = lit_fraction(cos_facet_light, cos_light, cos_facet)
     return torch.minimum(lit, lit_fraction(cos_facet_view, cos_view, cos_facet))
@@ -45,8 +48,9 @@ def strip_fraction(projection: Tensor) -> Tensor:
 
 
 def hidden_fraction(projection: Tensor) -> Tensor:
-    """Part of the facet, from the valley, that the direction does not reach: clamp(1 - 2/X), 1 for X <= 0; eqs. (15),
-    (16) repaired. [-]
+    """Part of the facet, from the valley, that the direction does not reach: clamp(1 - 2/X), 1 for X <= 0. [-]
+
+    Source: Oren & Nayar 1994, eqs. (15), (16) repaired.
     """
     return 1 - strip_fraction(projection)
 
@@ -56,7 +60,7 @@ def direct_integrand(light_projection: Tensor, view_projection: Tensor) -> Tenso
 
     Args: u.p and u.q (...). [-]
     Returns: (...). [-] The direct BRDF of facets with slope u is (rho/pi) cos(theta_a) times this.
-    Source: eqs. (10), (38) and Table 1, in the slope plane.
+    Source: Oren & Nayar 1994, eqs. (10), (38) and Table 1, in the slope plane.
     """
     x = (1 + light_projection).clamp(min=0)
     y = (1 + view_projection).clamp(min=0)

@@ -1,7 +1,8 @@
 """Photographs and measured reflectance on disk."""
 
+from inverse.files.images import read_image, write_image
 from inverse.files.reflectance import Measurements, read_gonioreflectometer, read_merl, read_optical_constants
-from inverse.files.stacks import Photographs, read_image, read_stack, usable, write_image, write_stack
+from inverse.files.stacks import Photographs, read_stack, write_stack
 
 __all__ = [
     "Measurements",
@@ -11,7 +12,6 @@ __all__ = [
     "read_merl",
     "read_optical_constants",
     "read_stack",
-    "usable",
     "write_image",
     "write_stack",
 ]

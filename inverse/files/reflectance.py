@@ -72,6 +72,7 @@ def read_merl(path: str | Path) -> TabulatedBRDF:
     phi_d and pi - phi_d, which reciprocity and symmetry make one, are averaged. Negative entries mark directions
     that were not measured; they become 0.
     Raises: ValueError for a file of another size than its header says, or whose dimensions are not a table.
+    Source: Matusik, Pfister, Brand & McMillan 2003, "A data-driven reflectance model", DOI 10.1145/882262.882343.
     """
     data = Path(path).read_bytes()
     if len(data) < _MERL_HEADER:
@@ -134,10 +135,10 @@ def _direction(theta: Tensor, phi: Tensor) -> Tensor:
 
 
 def _numbers(body: str, key: str) -> list[float]:
-    found = re.search(rf"^ *{key}: *(.*)$", body, re.M)
-    if found is None:
+    entry = re.search(rf"^ *{key}: *(.*)$", body, re.M)
+    if entry is None:
         raise ValueError(f"{key} is missing")
-    return [float(x) for x in found.group(1).split()]
+    return [float(x) for x in entry.group(1).split()]
 
 
 def _check_range(path: str | Path, micro: np.ndarray, low: float, high: float) -> None:

@@ -5,6 +5,7 @@ from inverse.fitting.photographs import FitError, fit
 from inverse.fitting.prediction import predictor
 from inverse.fitting.resampling import bootstrap
 from inverse.fitting.result import FitResult
+from inverse.fitting.selection import usable
 
 __all__ = [
     "FitError",
@@ -13,5 +14,6 @@ __all__ = [
     "fit",
     "fit_measurements",
     "predictor",
+    "usable",
     "weighted_reflectance",
 ]

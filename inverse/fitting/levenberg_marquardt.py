@@ -3,6 +3,9 @@
 The unknowns of one pixel touch only that pixel's residuals, so they are eliminated pixel by pixel
 (Schur complement): a million pixels with an albedo each and one roughness cost a million small
 solves and one more. Derivatives are exact, by forward differentiation.
+Source: Levenberg 1944, "A method for the solution of certain non-linear problems in least squares", DOI
+    10.1090/qam/10666; Marquardt 1963, "An algorithm for least-squares estimation of nonlinear parameters", DOI
+    10.1137/0111030.
 """
 
 from collections.abc import Callable
@@ -68,7 +71,7 @@ class NormalEquations:
     def step(self, damping: float) -> tuple[Tensor, Tensor]:
         """Damped Gauss-Newton step (shared, own) inside the box of the longest step.
 
-        Damping is in proportion to the diagonal (Marquardt). A pixel whose own step leaves the box, near
+        Damping is in proportion to the diagonal (Marquardt 1963). A pixel whose own step leaves the box, near
         the flat end of a domain, cannot follow the shared unknowns: it is cut, held, and the rest solved anew.
         """
         own_scale, shared_scale = scale(self.own), scale(self.shared)

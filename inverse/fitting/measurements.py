@@ -87,7 +87,9 @@ def weighted_reflectance(cosines: Cosines, values: Tensor, knee: float = math.in
 
     The cosines take the weight from grazing directions, where f_r is a small signal divided by one. y itself
     below the knee k [1/sr], its logarithm far above: there the relative error counts. 0 below the horizon.
-    Source: the cosine weight and the logarithm are those of Loew et al. 2012, made symmetric in light and view.
+    Source: the cosine weight and the logarithm are those of Loew, Kronander, Ynnerman & Unger 2012, "BRDF models for
+        accurate and efficient rendering of glossy surfaces", DOI 10.1145/2077341.2077350, made symmetric in light and
+        view.
     """
     y = cosines.zero_below_horizon(values * (cosines.light * cosines.view)[:, None])
     return y if math.isinf(knee) else knee * (y / knee).asinh()

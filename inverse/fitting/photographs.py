@@ -11,12 +11,10 @@ from inverse.fitting.identifiability import Covariance, judge
 from inverse.fitting.levenberg_marquardt import Residual, Solution, minimise
 from inverse.fitting.prediction import predictor
 from inverse.fitting.result import FitResult
+from inverse.fitting.selection import checked, usable_samples
 from inverse.fitting.unknowns import Unknowns
 from inverse.scene import Scene
 from torchbrdf import BRDF
-
-# Photographs with fewer unsaturated samples than this share of the object are refused.
-_LEAST_UNSATURATED = 0.5
 
 
 class FitError(RuntimeError):
@@ -136,52 +134,6 @@ def checked_model(model: BRDF, starts: int, max_steps: int) -> BRDF:
         if not isinstance(count, int) or count < 1:
             raise ValueError(f"{name} must be a whole number of at least 1; found {count}.")
     return model
-
-
-def checked(scene: Scene, photographs: Tensor) -> Tensor:
-    """The photographs, if they can be of this scene; TypeError or ValueError otherwise."""
-    if not isinstance(photographs, Tensor) or not photographs.is_floating_point():
-        found = photographs.dtype if isinstance(photographs, Tensor) else type(photographs).__name__
-        raise TypeError(f"photographs must be a floating-point torch.Tensor with full scale 1; found {found}.")
-    rows, columns = scene.surface.resolution
-    if photographs.ndim != 4 or photographs.shape[:3] != (scene.images, rows, columns) or not photographs.shape[3]:
-        raise ValueError(
-            f"photographs must have shape (image, rows, columns, channel) = ({scene.images}, {rows}, {columns}, "
-            f"channel), one image for each of the scene's {scene.images} sets of lights; "
-            f"found {tuple(photographs.shape)}."
-        )
-    broken = ~photographs.isfinite()
-    if broken.any():
-        where = ", ".join(str(k) for k in broken.flatten(1).any(1).nonzero()[:, 0].tolist())
-        raise ValueError(f"photographs must be finite; {int(broken.sum())} values are not, in image {where}.")
-    return photographs
-
-
-def usable_samples(scene: Scene, photographs: Tensor, valid: Tensor | None) -> Tensor:
-    """Samples the fit uses (image, rows, columns): covered, allowed by `valid`, not saturated."""
-    allowed = (scene.surface.coverage() == 1).expand(photographs.shape[:3])
-    if valid is not None:
-        if not isinstance(valid, Tensor):
-            raise TypeError(f"valid must be a torch.Tensor; found {type(valid).__name__}.")
-        if valid.shape != photographs.shape[:3] or valid.dtype != torch.bool:
-            raise ValueError(
-                f"valid must be bool of shape {tuple(photographs.shape[:3])}; found {valid.dtype} {tuple(valid.shape)}."
-            )
-        allowed = allowed & valid
-    if not allowed.any():
-        raise ValueError("no sample is left to fit: the mask, or its overlap with `valid`, is empty.")
-    unsaturated = (photographs < 1).all(-1)
-    for index, (image, candidates, good) in enumerate(zip(photographs, allowed, unsaturated, strict=True)):
-        if not candidates.any():
-            continue
-        if not (image[candidates] > 0).any():
-            raise ValueError(f"photograph {index} is all dark: no object pixel is above 0.")
-        share = good[candidates].double().mean().item()
-        if share < _LEAST_UNSATURATED:
-            raise ValueError(
-                f"photograph {index} is saturated: {1 - share:.0%} of the object's samples reach full scale 1."
-            )
-    return allowed & unsaturated
 
 
 def _starts(unknowns: Unknowns, first: Tensor, count: int, seed: int) -> list[Tensor]:

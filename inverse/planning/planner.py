@@ -15,7 +15,7 @@ from inverse.planning.plans import Effect, Plan
 from inverse.planning.sampling_detail import sampling_options
 from inverse.scene import Scene
 from inverse.transport import render
-from torchbrdf import BRDF, EFFECTS, compact, is_per_texel, options, simulated, trainable
+from torchbrdf import BRDF, EFFECTS, is_per_texel, simulated, trainable
 
 
 def plan(
@@ -60,14 +60,14 @@ def plan(
     absent = {entry.effect: entry.absent for entry in entries if entry.absent is not None}
     present = [entry for entry in entries if entry.absent is None]
     alone = {k.effect: watch.alone(measure, k.choice, k.apply(sample), model) for k in present}
-    for option in (k for group in options(model).values() for k in group):
+    for option in (k for group in model.stand_ins().values() for k in group):
         tried = watch.alone(measure, option.choice, sample, option.model)
         alone |= {name: tried for name in option.skips if name not in alone or tried.size < alone[name].size}
 
     def error(scene: Scene, model: BRDF) -> float:
         return measure.size(watch.values(scene, model), scene, model)
 
-    stand_in, done = _cheapest_material(model, lambda k: error(sample, k) <= budget)
+    stand_in, names, done = _cheapest_material(model, lambda k: error(sample, k) <= budget)
     left = full
     for entry in sorted(present, key=lambda k: -alone[k.effect].saved):
         ways = sampling_options(left, stand_in) if entry.effect == FOOTPRINT else [(entry.choice, entry.apply)]
@@ -81,11 +81,12 @@ def plan(
         verdicts[FOOTPRINT] = (True, f"in part; {done[FOOTPRINT]}")
     ruled_out = {name: Effect(name, 0.0 if k.certain else None, False, k.reason) for name, k in absent.items()}
     tried = {name: _row(name, size, verdicts.get(name), budget) for name, size in alone.items()}
-    names = dict.fromkeys((*(entry.effect for entry in entries), *tried))
-    rows = [(ruled_out | tried)[name] for name in names]
-    planned, parts = compact(stand_in)
+    # what only a stand-in could leave out in its turn was not tried alone
+    also = {name: Effect(name, None, *verdict) for name, verdict in verdicts.items() if name not in tried}
+    listed = dict.fromkeys((*(entry.effect for entry in entries), *tried, *also))
+    rows = [(ruled_out | tried | also)[name] for name in listed]
     return Plan(
-        scene=left, model=planned, names=_names(planned, parts), effects=(*rows, *_others(full, model)),
+        scene=left, model=stand_in, names=names, effects=(*rows, *_others(full, model)),
         of=of, tolerance=tolerance, limit=measure.limit, error=error(sample, stand_in),
         safety=safety, pilot=int(chosen.sum()),
     )  # fmt: skip
@@ -123,30 +124,27 @@ class _Watch:
         return values, time.perf_counter() - began
 
 
-def _cheapest_material(model: BRDF, close: Callable[[BRDF], bool]) -> tuple[BRDF, dict[str, str]]:
-    """The first option of each group that stays close, on top of those taken before; parts are dropped last."""
+def _cheapest_material(model: BRDF, close: Callable[[BRDF], bool]) -> tuple[BRDF, dict[str, str], dict[str, str]]:
+    """The first option of each group that stays close, on top of those taken before; what was left out, and instead.
+
+    Second, of parameters that have another name in the given model, that name.
+    """
+    names: dict[str, str] = {}
     skipped: dict[str, str] = {}
     tried: set[str] = set()
     while True:
-        groups = [name for name in options(model) if name not in tried]
+        groups = {name: options for name, options in model.stand_ins().items() if name not in tried}
         if not groups:
-            return model, skipped
-        group = min(groups, key=lambda name: name.startswith("part"))
+            return model, {name: names[name] for name in trainable(model) if name in names}, skipped
+        group, options = next(iter(groups.items()))
         tried.add(group)
-        for option in options(model)[group]:
+        for option in options:
             if close(option.model):
                 model = option.model
+                before = {name: option.renamed.get(name, name) for name in (*option.renamed, *names)}
+                names = {name: names.get(earlier, earlier) for name, earlier in before.items()}
                 skipped |= dict.fromkeys(option.skips, option.choice)
                 break
-
-
-def _names(model: BRDF, places: tuple[int, ...]) -> dict[str, str]:
-    """Of the parameters of a sum's parts, the names they have among the parts at given places."""
-    return {
-        f"parts.{here}.{name}": f"parts.{place}.{name}"
-        for here, place in enumerate(places)
-        for name in trainable(model.get_submodule(f"parts.{here}"))
-    }
 
 
 def _row(name: str, alone: _Tried, verdict: tuple[bool, str] | None, budget: float) -> Effect:
@@ -158,7 +156,7 @@ def _row(name: str, alone: _Tried, verdict: tuple[bool, str] | None, budget: flo
 
 def _others(scene: Scene, model: BRDF) -> list[Effect]:
     """Effects that are never traded: named, so that nothing is left out silently."""
-    sensor, known = scene.sensor, simulated(model)
+    sensor, known = scene.sensor, simulated(model, by_part=False)
     rows = [
         Effect("attached shadow", None, True, "the light's cosine: costs nothing"),
         Effect("point-spread function", None, sensor.psf_sigma > 0, "the sensor's; expose and fit apply it"),
@@ -168,9 +166,7 @@ def _others(scene: Scene, model: BRDF) -> list[Effect]:
     ]
     kind = type(model).__name__
     rows += [
-        Effect(name, None, False, f"nothing of it that {kind} could leave out")
-        for name in EFFECTS
-        if not any(k == name or k.startswith(f"{name} of ") for k in known)
+        Effect(name, None, False, f"nothing of it that {kind} could leave out") for name in EFFECTS if name not in known
     ]
     return rows
 

@@ -15,11 +15,13 @@ from inverse.scene.lights import (
     Light,
     Point,
     SimplerLight,
+    StoredLight,
     as_channels,
 )
 from inverse.scene.maps import from_depth, from_normals
 from inverse.scene.scene import Scene
 from inverse.scene.sensor import Sensor
+from inverse.scene.stored_lights import Rays, from_numbers
 from inverse.scene.surface import (
     TO_CAMERA,
     Surface,
@@ -48,15 +50,18 @@ __all__ = [
     "Footprints",
     "Light",
     "Point",
+    "Rays",
     "Scene",
     "Sensor",
     "SimplerLight",
+    "StoredLight",
     "Surface",
     "as_channels",
     "cuboid",
     "cylinder",
     "from_depth",
     "from_normals",
+    "from_numbers",
     "orthographic",
     "perspective",
     "pinhole",

@@ -19,6 +19,9 @@ SOFTNESS = "extent of the source"
 MAP_DETAIL = "detail of the environment"
 AMBIENT = "ambient light"
 
+# A vector that was scaled to unit length has it to within so many units in the last place.
+_UNIT_ROUNDING = 4
+
 
 class Arrival(NamedTuple):
     """Light that reaches every point from one direction.
@@ -44,6 +47,24 @@ class SimplerLight(NamedTuple):
     effect: str
     choice: str
     light: "Light | None"
+
+
+class StoredLight(NamedTuple):
+    """A light in numbers, as a folder of photographs keeps it: the sum of what its fields hold, in float64.
+
+    Attributes:
+        directions: unit vectors (ray, 3) to light that is the same at every point.
+        irradiances: on a surface that faces each of them, (ray, 1 or channel).
+        positions: of small lamps, (lamp, 3).
+        intensities: of each, as of `Point`, (lamp, 1 or channel).
+        uniform: radiance from everywhere, (1 or channel,).
+    """
+
+    directions: Tensor | None = None
+    irradiances: Tensor | None = None
+    positions: Tensor | None = None
+    intensities: Tensor | None = None
+    uniform: Tensor | None = None
 
 
 class Light(ABC):
@@ -90,6 +111,19 @@ class Light(ABC):
         """Stand-ins that simulate less, for an object about a point (3,): one an effect."""
         return ()
 
+    def stored(self, points: Tensor) -> StoredLight:
+        """Itself in numbers that give points (point, 3) the light that `arrivals` and `uniform` do.
+
+        Raises: ValueError where arrivals depend on the point. Such a light says here which lamps it is made of.
+        """
+        rays = [_same_for_all(type(self).__name__, arrival) for arrival in self.arrivals(points)]
+        uniform = None if self.uniform is None else torch.atleast_1d(torch.as_tensor(self.uniform)).detach().double()
+        if not rays:
+            return StoredLight(uniform=uniform)
+        channels = max(len(irradiance) for _, irradiance in rays)
+        irradiances = torch.stack([irradiance.expand(channels) for _, irradiance in rays])
+        return StoredLight(torch.stack([direction for direction, _ in rays]), irradiances, uniform=uniform)
+
 
 @dataclass(frozen=True)
 class Distant(Light):
@@ -132,7 +166,7 @@ class Point(Light):
     Attributes:
         position: (3,), in the unit of the surface's points (half image heights).
         intensity: scalar or (channel,). [W/sr for lengths in m]
-    Source: course notes eqs. (20), (26).
+    Source: Fleet & Hertzmann 2006, "Computer Graphics Lecture Notes", University of Toronto, eqs. (20), (26).
     """
 
     position: Tensor
@@ -165,6 +199,10 @@ class Point(Light):
         distant = Distant(away, self.intensity / (away * away).sum())
         choice = "as strong as in the middle of the object, from one direction"
         return (SimplerLight(NEAR_LIGHT, choice, distant),)
+
+    def stored(self, points: Tensor) -> StoredLight:
+        strength = torch.atleast_1d(torch.as_tensor(self.intensity)).detach().double()
+        return StoredLight(positions=self.position.detach().double()[None], intensities=strength[None])
 
 
 @dataclass(frozen=True)
@@ -202,7 +240,7 @@ class Disc(Light):
         return strength / (math.pi * math.sin(self.half_angle) ** 2)
 
     def arrivals(self, points: Tensor) -> Iterator[Arrival]:
-        """The nodes of (31): radiance times the solid angle each stands for."""
+        """The nodes of Fleet & Hertzmann 2006, eq. (31): radiance times the solid angle each stands for."""
         edge = math.cos(self.half_angle)
         nodes, weights = leggauss(self.rings)
         axis = self.direction.double()
@@ -330,6 +368,18 @@ class Ambient(Light):
         return (SimplerLight(AMBIENT, "none", None),)
 
 
+def _same_for_all(kind: str, arrival: Arrival) -> tuple[Tensor, Tensor]:
+    """Direction (3,) and irradiance (1 or channel,) of light that is the same at every point; ValueError otherwise."""
+    rows = torch.atleast_2d(arrival.direction), arrival.irradiance
+    if not all((row == row[:1]).all() for row in rows):
+        raise ValueError(
+            f"{kind} cannot be stored: what arrives depends on the point. A light that is made of small lamps says "
+            f"which in its method `stored`."
+        )
+    direction, irradiance = (row[0].detach().double() for row in rows)
+    return direction, irradiance
+
+
 def _vector(name: str, value: Tensor) -> Tensor:
     vector = torch.as_tensor(value)
     if not vector.is_floating_point():
@@ -344,6 +394,8 @@ def _unit(name: str, value: Tensor) -> Tensor:
     length = vector.norm()
     if length == 0:
         raise ValueError(f"{name} must be a vector (3,) other than 0; found {value}.")
+    if (length - 1).abs() <= _UNIT_ROUNDING * torch.finfo(vector.dtype).eps:
+        return vector  # so that what was scaled once keeps its digits
     return vector / length
 
 

@@ -26,16 +26,16 @@ class Sensor:
     bits: int | None = None
 
     def __post_init__(self):
-        rules = {
-            "exposure must be positive and finite": 0 < self.exposure < float("inf"),
-            "psf_sigma must not be negative [pixel]": self.psf_sigma >= 0,
-            "read_noise must not be negative [full scale]": self.read_noise >= 0,
-            "full_well must be positive [electrons]": self.full_well is None or self.full_well > 0,
-            "bits must be 1 to 32": self.bits is None or 1 <= self.bits <= 32,
-        }
-        for rule, kept in rules.items():
+        rules = (
+            ("exposure", "must be positive and finite", 0 < self.exposure < float("inf")),
+            ("psf_sigma", "must not be negative [pixel]", self.psf_sigma >= 0),
+            ("read_noise", "must not be negative [full scale]", self.read_noise >= 0),
+            ("full_well", "must be positive [electrons]", self.full_well is None or self.full_well > 0),
+            ("bits", "must be 1 to 32", self.bits is None or 1 <= self.bits <= 32),
+        )
+        for name, rule, kept in rules:
             if not kept:
-                raise ValueError(f"Sensor.{rule}; found {getattr(self, rule.split()[0])}.")
+                raise ValueError(f"Sensor.{name} {rule}; found {getattr(self, name)}.")
 
     def focus(self, image: Tensor) -> Tensor:
         """Blur images (..., rows, columns, channel) by the point-spread function; borders reflect."""

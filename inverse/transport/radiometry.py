@@ -1,4 +1,7 @@
-"""Solid angles, irradiance and exitance: what the lights bring to a surface and what it sends back."""
+"""Solid angles, irradiance and exitance: what the lights bring to a surface and what it sends back.
+
+Source: Fleet & Hertzmann 2006, "Computer Graphics Lecture Notes", University of Toronto CSC418/CSCD18/CSC2504.
+"""
 
 import math
 from dataclasses import replace
@@ -21,7 +24,7 @@ def solid_angle_of_cone(half_angle: float) -> float:
 def solid_angle_of_band(polar: tuple[float, float], azimuth: tuple[float, float]) -> float:
     """Of the directions between two polar angles and two azimuths [rad]: (phi1 - phi0)(cos theta0 - cos theta1) [sr].
 
-    Source: course notes eq. (13).
+    Source: Fleet & Hertzmann 2006, eq. (13).
     """
     middle, half = (polar[0] + polar[1]) / 2, (polar[1] - polar[0]) / 2
     return (azimuth[1] - azimuth[0]) * 2 * math.sin(middle) * math.sin(half)
@@ -30,23 +33,24 @@ def solid_angle_of_band(polar: tuple[float, float], azimuth: tuple[float, float]
 def solid_angle_of_patch(area: float, cosine: float, distance: float) -> float:
     """Of a small patch seen from afar: dA cos(theta)/r^2 [sr]; lengths in one unit.
 
-    Source: course notes eq. (14).
+    Source: Fleet & Hertzmann 2006, eq. (14).
     """
     return area * cosine / distance**2
 
 
 def irradiance(surface: Surface, lights: tuple[Light, ...]) -> Tensor:
-    """Irradiance (point, channel) that lights give the masked points of a surface: (24), (26).
+    """Irradiance (point, channel) that lights give the masked points of a surface; pi L under ambient light.
 
-    pi L under ambient light.
+    Source: Fleet & Hertzmann 2006, eqs. (24), (26).
     """
     footprints = Footprints.of(surface)
     return direct_irradiance(lights, footprints.points, footprints.normals, footprints.solid)
 
 
 def exitance(model: BRDF, surface: Surface, lights: tuple[Light, ...], *, nodes: int = 16) -> Tensor:
-    """Light (point, channel) that the masked points send into all directions: int L (n.d) dw, (22).
+    """Light (point, channel) that the masked points send into all directions: int L (n.d) dw.
 
+    Source: Fleet & Hertzmann 2006, eq. (22).
     Quadrature of the radiance over the views: `nodes` Gauss-Legendre cosines times 2 `nodes` azimuths. A lobe narrower
     than the nodes are apart is missed; a mirror lobe is left out.
     """

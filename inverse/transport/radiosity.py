@@ -6,7 +6,8 @@ The parts scatter as Lambert surfaces would, each of the same albedo rho, so the
    K = \frac{\cos\theta_x \cos\theta_y}{\pi |x - y|^2}\,V(x, y)
 
 with E the irradiance that arrives straight from the lights and V = 1 where the object is not in between
-(Goral et al. 1984). Its series in rho has coefficients that know nothing of the material: the irradiance after
+(Goral, Torrance, Greenberg & Battaile 1984, "Modeling the interaction of light between diffuse surfaces", DOI
+10.1145/800031.808601). Its series in rho has coefficients that know nothing of the material: the irradiance after
 b bounces between white parts, T_b = K^b E. A point then reflects the additional radiance
 sum_b rho^(b + 1) T_b / pi, which is differentiable in rho while the geometry is done once.
 """

@@ -6,8 +6,8 @@ import math
 import pytest
 import torch
 
-from torchbrdf import Cosines, OrenNayar
-from torchbrdf.accuracy import RUNGS, Ladder, Row, ladder, reference, relative_errors
+from torchbrdf import BRDF, Cosines, Lambert, Option, OrenNayar
+from torchbrdf.accuracy import RUNGS, Ladder, Row, ladder, reference, relative_errors, rungs_of
 from torchbrdf.models.oren_nayar.converged import converged
 from torchbrdf.models.oren_nayar.slope_plane import slope_plane
 from torchbrdf.testing import random_directions
@@ -41,7 +41,7 @@ def test_errors_of_the_fitted_forms_are_those_of_the_sheet():
 
 
 def test_ladder_measures_every_rung():
-    rungs = [RUNGS[0], RUNGS[3]]
+    rungs = [rung for rung in RUNGS if rung.name in ("Lambert", "functional")]
     table = ladder(0.5, [0.3, 0.9], directions(200), rungs=rungs, repeats=1)
     assert [row.name for row in table.rows] == ["Lambert", "functional"]
     assert table.rows[0].forward == 1
@@ -69,7 +69,47 @@ def test_ladder_refuses_directions_below_the_horizon():
 
 def test_saved_bytes_are_counted_once():
     cosines = directions(1000)
-    (row,) = ladder(0.5, 0.5, cosines, rungs=[RUNGS[3]], repeats=1).rows
+    (functional,) = (rung for rung in RUNGS if rung.name == "functional")
+    (row,) = ladder(0.5, 0.5, cosines, rungs=[functional], repeats=1).rows
     # a float64 tensor a point is 8 bytes; the functional model has about forty intermediate ones
     assert 8 * 10 < row.saved_bytes < 8 * 120
-    assert isinstance(RUNGS[3].build(torch.tensor(0.5), torch.tensor(0.5)), OrenNayar)
+    assert isinstance(functional.build(torch.tensor(0.5), torch.tensor(0.5)), OrenNayar)
+
+
+class Velvet(BRDF):
+    """Somebody's own model: Lambert with a sheen of width sigma, which it says it could do without."""
+
+    def __init__(self, albedo, sigma):
+        super().__init__()
+        self.body, self.sigma = Lambert(albedo=albedo), sigma
+
+    def evaluate_components(self, cosines):
+        sheen = 0.01 * ((1 - cosines.light) * (1 - cosines.view)) ** (1 / self.sigma)
+        return {"body": self.body.evaluate(cosines), "sheen": sheen[..., None]}
+
+    def stand_ins(self):
+        return {"sheen": [Option("no sheen", ("sheen",), self.body)]}
+
+
+def test_a_model_of_your_own_joins_the_ladder():
+    rungs = rungs_of("velvet", Velvet)
+    cosines = directions(200)
+    table = ladder(0.5, 0.6, cosines, rungs=rungs, against=Velvet, repeats=1)
+    bottom, top = table.rows
+    assert (bottom.name, top.name) == ("no sheen", "velvet")
+    assert top.rms_error == 0
+    sheen = 0.01 * ((1 - cosines.light) * (1 - cosines.view)) ** 2
+    assert bottom.max_error == pytest.approx(float((sheen / (0.6 / math.pi + sheen)).max()), rel=1e-6)
+
+
+def test_the_ladder_is_the_stand_ins_of_its_exact_model():
+    """And beside them only what leaves nothing out of another."""
+    names = [rung.name for rung in RUNGS]
+    assert len(names) == len(set(names))
+    exact = RUNGS[-1].build(torch.tensor(0.5), torch.tensor(0.3))
+    added = set(names) - {option.choice for option in exact.stand_ins()["rung"]}
+    assert added == {"qualitative (0.57)", "closed form, K = 16", "exact, K = 48, all bounces"}
+    for rung in RUNGS:
+        model = rung.build(torch.tensor(0.7, dtype=DOUBLE), torch.tensor(0.4, dtype=DOUBLE))
+        assert model.albedo.item() == pytest.approx(0.7)
+        assert isinstance(model, Lambert) or model.sigma.item() == pytest.approx(0.4)

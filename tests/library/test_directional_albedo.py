@@ -14,7 +14,7 @@ def test_directional_albedo_agrees_with_another_quadrature(model):
     brdf = model.make(torch.float64)
     for angle in (0.0, 0.5, 1.2, math.radians(85)):
         cosine = torch.tensor(math.cos(angle), dtype=torch.float64)
-        expected = laws._directional_albedo(brdf, angle, max(32, model.nodes))
+        expected = laws.albedo_by_quadrature(brdf, angle, max(32, model.nodes))
         upright = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64)
         view = torch.tensor([math.sin(angle), 0.0, math.cos(angle)], dtype=torch.float64)
         mirror = brdf.delta_reflectance(brdf.cosines(upright, upright, view, normalize=True))

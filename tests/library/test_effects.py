@@ -3,7 +3,9 @@
 import pytest
 import torch
 
+import torchbrdf
 from torchbrdf import (
+    BRDF,
     EFFECTS,
     EON,
     GGX,
@@ -17,13 +19,10 @@ from torchbrdf import (
     OrenNayar,
     Oriented,
     Perfect,
-    QualitativeOrenNayar,
     RoughSurface,
     TorranceSparrow,
     WeightedSum,
-    compact,
     fixed,
-    options,
     simulated,
 )  # fmt: skip
 from torchbrdf.testing import random_directions
@@ -52,7 +51,7 @@ LADDERS = {
 @pytest.mark.parametrize("name", LADDERS)
 def test_rungs_leave_out_less_and_less_of_the_same_material(name):
     model = LADDERS[name]()
-    rungs = options(model)["rung"]
+    rungs = model.stand_ins()["rung"]
     assert set(simulated(model)) <= set(EFFECTS)
     assert rungs[0].skips == simulated(model)
     for rung in rungs:
@@ -65,7 +64,7 @@ def test_rungs_leave_out_less_and_less_of_the_same_material(name):
 def test_what_each_rung_says_it_leaves_out_is_what_it_leaves_out():
     """Two bounces differ from all by the later ones alone; without C3 a functional form is 0 there; and so on."""
     model = material(RoughSurface, bounces="all")
-    found = {k.choice: k for k in options(model)["rung"]}
+    found = {k.choice: k for k in model.stand_ins()["rung"]}
     directions = random_directions(50, dtype=D, generator=torch.Generator().manual_seed(0))
     parts = model.components(*directions)
     two = found["exact, K = 16, 2 bounces"]
@@ -91,26 +90,50 @@ def test_c3_acts_across_the_plane_of_incidence_alone():
 
 def test_what_is_held_stays_held():
     model = RoughSurface(albedo=fixed(number(0.5)), sigma=number(0.4))
-    for rung in options(model)["rung"]:
+    for rung in model.stand_ins()["rung"]:
         names = {name for name, _ in rung.model.named_parameters()}
         assert names == (set() if isinstance(rung.model, Lambert) else {"raw_sigma"})
 
 
 def test_parts_of_a_sum():
     model = WeightedSum([material(OrenNayar), GGX(alpha=number(0.3), fresnel=Dielectric(eta=number(1.5)))], [0.9, 0.2])
-    groups = options(model)
-    assert set(groups) == {"part 1", "rung of part 1", "part 2", "Fresnel variation of part 2"}
+    groups = model.stand_ins()
+    assert list(groups) == ["rung of part 1", "Fresnel variation of part 2", "part 1", "part 2"]
     directions = random_directions(20, dtype=D, generator=torch.Generator().manual_seed(1))
-    dropped = groups["part 2"][0].model
-    assert [type(part) for part in dropped.parts] == [OrenNayar, Lambert]
-    alone, places = compact(dropped)
-    assert places == (0,)
+    alone = groups["part 2"][0].model
     assert [type(part) for part in alone.parts] == [OrenNayar]
     torch.testing.assert_close(alone(*directions), 0.9 * material(OrenNayar)(*directions))
-    torch.testing.assert_close(dropped(*directions), alone(*directions))
-    assert set(options(dropped)) == {"rung of part 1"}  # the last part stays
+    assert set(alone.stand_ins()) == {"rung of part 1"}  # the last part stays
     model = WeightedSum(list(model.parts), fixed(number([0.9, 0.2])))
-    assert not [name for name, _ in options(model)["part 2"][0].model.named_parameters() if "weights" in name]
+    assert not [name for name, _ in model.stand_ins()["part 2"][0].model.named_parameters() if "weights" in name]
+    assert simulated(model, by_part=False)[-3:] == ("Fresnel variation", "part 1", "part 2")
+
+
+def test_parts_that_stay_keep_their_names():
+    model = WeightedSum([GGX(alpha=number(0.3)), material(OrenNayar), EON(albedo=number([0.3]))], [0.1, 0.9, 0.3])
+    (dropped,) = model.stand_ins()["part 1"]
+    assert [type(part) for part in dropped.model.parts] == [OrenNayar, EON]
+    groups = dropped.model.stand_ins()
+    assert list(groups) == ["rung of part 2", "rung of part 3", "part 2", "part 3"]
+    assert groups["part 2"][0].skips[:2] == ("part 2", "roughness of part 2")
+    assert dropped.renamed == {
+        "parts.0.albedo": "parts.1.albedo",
+        "parts.0.sigma": "parts.1.sigma",
+        "parts.1.albedo": "parts.2.albedo",
+        "parts.1.roughness": "parts.2.roughness",
+    }
+    for stand_in, given in dropped.renamed.items():
+        assert torch.equal(value(dropped.model, stand_in), value(model, given))
+    inner = WeightedSum([Lambert(albedo=number(0.2)), model], [1.0, 1.0])
+    (dropped,) = inner.stand_ins()["part 1 of part 2"]
+    assert dropped.skips[0] == "part 1 of part 2"
+    assert dropped.renamed["parts.1.parts.0.sigma"] == "parts.1.parts.1.sigma"
+    assert "roughness" in simulated(inner, by_part=False)
+
+
+def value(model, path):
+    *modules, last = path.split(".")
+    return getattr(model.get_submodule(".".join(modules)), last)
 
 
 def test_constant_reflectance_is_that_of_normal_incidence():
@@ -118,29 +141,83 @@ def test_constant_reflectance_is_that_of_normal_incidence():
     glass = Dielectric(eta=number(1.5))
     lobes = (GGX(alpha=number(0.3)), Beckmann(alpha=number(0.3)), TorranceSparrow(sigma=number(0.3), fresnel=glass))
     for lobe in lobes:
-        flat = options(lobe)["Fresnel variation"][0].model
+        flat = lobe.stand_ins()["Fresnel variation"][0].model
         assert isinstance(flat.fresnel, ConstantFresnel)
         torch.testing.assert_close(flat(up, up, up), lobe(up, up, up), rtol=1e-6, atol=0)
         side = torch.tensor([0.96, 0, 0.28], dtype=D)
         mirrored = torch.tensor([-0.96, 0, 0.28], dtype=D)
         assert (flat(up, side, mirrored) < 0.7 * lobe(up, side, mirrored)).all()
-    assert "Fresnel variation" not in options(TorranceSparrow(fresnel=Perfect()))
+    assert "Fresnel variation" not in TorranceSparrow(fresnel=Perfect()).stand_ins()
 
 
 def test_anisotropic_models_have_an_isotropic_one():
     brushed = Oriented(AnisotropicGGX(alpha_x=number(0.4), alpha_y=number(0.4)), torch.tensor([1.0, 0, 0.3], dtype=D))
-    rounded = options(brushed)["anisotropy"][0].model
+    rounded = brushed.stand_ins()["anisotropy"][0].model
     assert isinstance(rounded, GGX)
     directions = random_directions(20, dtype=D, generator=torch.Generator().manual_seed(2))
     torch.testing.assert_close(rounded(*directions), brushed(*directions))
     grooves = AnisotropicRoughSurface(albedo=number(0.5), sigma_x=number(0.3), sigma_y=number(0.4))
-    stand_in = options(grooves)["anisotropy"][0].model
+    stand_in = grooves.stand_ins()["anisotropy"][0].model
     assert isinstance(stand_in, RoughSurface)
     assert stand_in.sigma.item() == pytest.approx(0.5**0.5 * 0.5)
 
 
+def test_turned_stand_ins_know_their_former_names():
+    """Bare where they have no grain, turned where they have."""
+    brushed = AnisotropicGGX(alpha_x=number(0.2), alpha_y=number(0.4), fresnel=Dielectric(eta=number(1.5)))
+    model = Oriented(brushed, torch.tensor([1.0, 0, 0.3], dtype=D))
+    (rounded,) = model.stand_ins()["anisotropy"]
+    assert rounded.renamed == {"fresnel.eta": "brdf.fresnel.eta"}
+    (flat,) = model.stand_ins()["Fresnel variation"]
+    assert isinstance(flat.model, Oriented)
+    assert flat.renamed == {}
+    pair = 0.3 * brushed + 0.7 * GGX(alpha=number(0.1))
+    (dropped,) = Oriented(pair, model.direction).stand_ins()["part 1"]
+    assert dropped.renamed == {
+        "parts.0.alpha": "brdf.parts.1.alpha",
+        "parts.0.fresnel.f0": "brdf.parts.1.fresnel.f0",
+        "weights": "brdf.weights",
+    }
+    (dropped,) = Oriented(pair, model.direction).stand_ins()["part 2"]
+    assert dropped.renamed == {}
+
+
+def test_eon_without_its_returned_light_is_fujii():
+    eon = EON(albedo=number([0.7, 0.4]), roughness=fixed(number(0.6)))
+    smooth, fujii = eon.stand_ins()["rung"]
+    directions = random_directions(50, dtype=D, generator=torch.Generator().manual_seed(3))
+    assert smooth.skips == ("roughness", "interreflection in cavities")
+    torch.testing.assert_close(smooth.model(*directions), Lambert(albedo=eon.albedo.detach())(*directions))
+    assert fujii.skips == ("interreflection in cavities",)
+    torch.testing.assert_close(fujii.model(*directions), eon.components(*directions)["direct"])
+    assert [name for name, _ in fujii.model.named_parameters()] == ["raw_albedo"]
+    assert [k.choice for k in fujii.model.stand_ins()["rung"]] == ["Lambert"]
+
+
+def test_an_interreflection_alone_has_no_stand_in():
+    assert material(OrenNayar, direct=False).stand_ins() == {}
+
+
 def test_models_without_stand_ins():
-    for model in (Lambert(), EON(), QualitativeOrenNayar()):
-        assert options(model) == {}
+    for model in (Lambert(), Perfectly()):
+        assert model.stand_ins() == {}
         assert simulated(model) == ()
-        assert compact(model) == (model, ())
+
+
+class Perfectly(BRDF):
+    """Somebody's own model that says nothing of stand-ins."""
+
+    def evaluate_components(self, cosines):
+        return {"all": cosines.light[..., None] / torch.pi}
+
+
+def test_options_is_an_old_name():
+    with pytest.warns(DeprecationWarning, match="stand_ins"):
+        options = torchbrdf.options
+    assert list(options(material(OrenNayar))) == ["rung"]
+
+
+@pytest.mark.parametrize(("name", "what"), [("sampling_laws", "assert_weights"), ("accuracy_series", "series_ladder")])
+def test_modules_that_moved_are_found_under_their_old_names(name, what):
+    with pytest.warns(DeprecationWarning, match="is now part of"):
+        assert callable(getattr(getattr(torchbrdf, name), what))

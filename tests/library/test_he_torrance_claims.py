@@ -14,7 +14,7 @@ ALUMINIUM = {2.0: 2.15 + 20.7j, 0.5: 0.77 + 6.08j}  # index by wavelength [um]
 
 
 def surface(sigma0, tau, wavelength, index, a=0.0):
-    """With the spike averaged over cones of pi/1024 sr, as the figures have it."""
+    """With the specular part averaged over cones of pi/1024 sr, as the figures have it."""
     names = ("sigma0", "tau", "wavelength", "eta", "k", "diffuse")
     values = (sigma0, tau, wavelength, complex(index).real, complex(index).imag, a)
     held = {name: fixed(torch.tensor(value, dtype=F64)) for name, value in zip(names, values, strict=True)}
@@ -39,7 +39,7 @@ def total(model, theta_i, theta_r):
     return sum(forward(model, theta_i, theta_r).values())
 
 
-def spike_over_the_rest(model, theta):
+def specular_over_the_rest(model, theta):
     parts = forward(model, theta, theta)
     return (parts["specular"] / (parts["directional_diffuse"] + parts["uniform_diffuse"])).item()
 
@@ -54,7 +54,7 @@ def mirrored(wavelength, theta):
 @pytest.mark.parametrize(("theta", "rho", "ratio"), [(10, 0.049, 16), (45, 0.208, 77), (75, 0.569, 2600)])
 def test_aluminium_at_long_wavelengths_is_specular(theta, rho, ratio):
     assert mirrored(2.0, theta) == pytest.approx(rho, abs=6e-4)
-    assert spike_over_the_rest(aluminium(2.0), theta) == pytest.approx(ratio, rel=0.03)
+    assert specular_over_the_rest(aluminium(2.0), theta) == pytest.approx(ratio, rel=0.03)
 
 
 @pytest.mark.parametrize(
@@ -68,18 +68,18 @@ def test_maximum_beyond_the_specular_angle(theta, peak, rise):
 
 def test_specular_peak_of_aluminium_emerges_at_75_degrees():
     model = aluminium(0.5)
-    assert spike_over_the_rest(model, 60) < 0.1
-    assert spike_over_the_rest(model, 75) == pytest.approx(3.9, abs=0.06)
+    assert specular_over_the_rest(model, 60) < 0.1
+    assert specular_over_the_rest(model, 75) == pytest.approx(3.9, abs=0.06)
     assert VIEWS[total(model, 75, VIEWS).argmax()].item() == pytest.approx(75, abs=0.02)
     assert mirrored(0.5, 75) == pytest.approx(0.032, abs=6e-4)
 
 
 @pytest.mark.parametrize("theta", [10, 45, 75])
-def test_spike_grows_with_wavelength(theta):
+def test_specular_part_grows_with_wavelength(theta):
     assert mirrored(2.0, theta) > 10 * mirrored(0.5, theta)
 
 
-def test_magnesium_oxide_shows_a_lobe_and_no_specular_spike():
+def test_magnesium_oxide_is_directional_diffuse_and_not_specular():
     with pytest.warns(UserWarning, match="exceeds the energy bound 0.78"):
         model = surface(1.45, 13.2, 0.5, 1.74, a=0.9)
     near_normal = total(model, 10, torch.linspace(-85, 85, 341, dtype=F64))
@@ -87,7 +87,7 @@ def test_magnesium_oxide_shows_a_lobe_and_no_specular_spike():
     curve = total(model, 75, VIEWS)
     assert VIEWS[curve.argmax()].item() == pytest.approx(87.4, abs=0.1)
     assert (curve.max() / total(model, 75, 75)).item() == pytest.approx(4.1, abs=0.05)
-    assert spike_over_the_rest(model, 75) < 1e-30  # the paper speaks of a specular peak
+    assert specular_over_the_rest(model, 75) < 1e-30  # the paper speaks of a specular peak
 
 
 def test_sandpaper_is_brightest_at_grazing():
@@ -103,7 +103,7 @@ def test_sandpaper_depends_on_the_slope_alone(tau):
     assert (scaled / reference).item() == pytest.approx(1, abs=7e-3)
 
 
-def test_plastic_is_a_spike_over_a_flat_base():
+def test_plastic_is_a_specular_part_over_a_flat_base():
     model = surface(0.0, 1.0, 0.46, 1.5, a=0.15)
     for theta, peak in ((15, 13.6), (30, 15.7), (45, 23.2), (60, 58.2)):
         parts = forward(model, theta, theta)

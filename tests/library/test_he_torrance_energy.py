@@ -1,4 +1,4 @@
-"""Energy, the averaged spike and sampling of the He-Torrance model; what the module says and refuses."""
+"""Energy, the averaged specular part and sampling of the He-Torrance model; what the module says and refuses."""
 
 import math
 import warnings
@@ -8,10 +8,11 @@ import torch
 from test_he_torrance import GOLDEN, UP, doubles, material
 from torch.testing import assert_close
 
-from torchbrdf import HeTorrance, fixed, sampling_laws
-from torchbrdf.models.he_torrance.energy import lobe_albedo
+from torchbrdf import HeTorrance, fixed
+from torchbrdf import testing as laws
+from torchbrdf.models.he_torrance.energy import directional_diffuse_albedo
 from torchbrdf.models.he_torrance.reflectance import specular_reflectivity
-from torchbrdf.models.he_torrance.spike import cone_overlap
+from torchbrdf.models.he_torrance.specular import cone_overlap
 
 PERFECT = 1e4j  # |F| = 1 at every angle
 
@@ -28,7 +29,7 @@ def model(sigma0, tau, wavelength, index, **more):
 
 def surface_albedo(cos, *parameters):
     surface = material(*parameters)
-    return (lobe_albedo(cos, **surface) + specular_reflectivity(cos, **surface))[:, 0]
+    return (directional_diffuse_albedo(cos, **surface) + specular_reflectivity(cos, **surface))[:, 0]
 
 
 # figures of the equation sheet, section 10 and 2, by another quadrature
@@ -57,17 +58,17 @@ def test_what_the_surface_returns(parameters, degrees, expected, atol):
 )
 def test_quadrature_is_as_good_as_it_says(parameters):
     surface, cos = material(*parameters), cosines(0, 30, 60, 80, 86, 89, 89.9)
-    fine = lobe_albedo(cos, nodes=80, **surface)
-    assert (lobe_albedo(cos, **surface) - fine).abs().max() < 2e-7
-    assert (lobe_albedo(cos, nodes=16, **surface) - fine).abs().max() < 1e-4
+    fine = directional_diffuse_albedo(cos, nodes=80, **surface)
+    assert (directional_diffuse_albedo(cos, **surface) - fine).abs().max() < 2e-7
+    assert (directional_diffuse_albedo(cos, nodes=16, **surface) - fine).abs().max() < 1e-4
 
 
 def test_albedo_agrees_with_monte_carlo():
-    # draws of the sampler, five standard errors; the mirror lobe is drawn apart
+    # draws of the sampler, five standard errors; the specular part is drawn apart
     for angle in (0.3, 1.4):
         brdf = model(0.1, 1.0, 0.5, 0.77 + 6.08j, diffuse=fixed(doubles([0.05])))
         with torch.no_grad():
-            weight = sampling_laws._Setting.of(brdf, angle).draw(40_000, torch.Generator().manual_seed(1)).weight
+            weight = laws.SamplingSetup.of(brdf, angle).draw(40_000, torch.Generator().manual_seed(1)).weight
         expected = brdf.directional_albedo(doubles(math.cos(angle)))
         assert abs(float(weight.mean() - expected)) < 5 * float(weight.std()) / math.sqrt(40_000)
 
@@ -87,7 +88,7 @@ def test_sampling_variance(parameters, degrees, variance, largest):
     # variance over squared mean, largest weight over mean
     brdf = model(*parameters, 0.77 + 6.08j)
     with torch.no_grad():
-        w = sampling_laws._Setting.of(brdf, math.radians(degrees)).draw(40_000, torch.Generator().manual_seed(0)).weight
+        w = laws.SamplingSetup.of(brdf, math.radians(degrees)).draw(40_000, torch.Generator().manual_seed(0)).weight
     assert w.var() / w.mean() ** 2 < variance
     assert w.max() / w.mean() < largest
 
@@ -119,8 +120,8 @@ def test_energy_bound_and_its_warning():
     glass = model(0.0, 1.0, 0.5, 1.5)
     assert glass.energy_bound(max_angle=math.pi / 2 - 1e-6) < 1e-4
     # an included part counts, one left out does not
-    matte = model(0.0, 1.0, 0.5, 1.5, specular=False, diffuse=fixed(doubles([1.0])))
-    assert_close(matte.energy_bound(), doubles([1.0]))
+    uniform = model(0.0, 1.0, 0.5, 1.5, specular=False, diffuse=fixed(doubles([1.0])))
+    assert_close(uniform.energy_bound(), doubles([1.0]))
 
 
 def test_units_that_differ_are_noticed():
@@ -152,12 +153,12 @@ def test_refusals(more, message):
 def test_parts_can_be_left_out():
     light, view = doubles([0.6, 0.0, 0.8]), doubles([-0.48, 0.6, 0.64])
     parameters = (0.1, 1.0, 0.5, 1.5)
-    body = {"diffuse": fixed(doubles([0.3])), "solid_angle": 1.0}
-    whole = model(*parameters, **body).components(UP, light, view)
+    material = {"diffuse": fixed(doubles([0.3])), "solid_angle": 1.0}
+    whole = model(*parameters, **material).components(UP, light, view)
     assert list(whole) == ["specular", "directional_diffuse", "uniform_diffuse"]
     assert all(float(part) > 0 for part in whole.values())
     for name in whole:
-        rest = model(*parameters, **body, **{name: False})
+        rest = model(*parameters, **material, **{name: False})
         assert list(rest.components(UP, light, view)) == [other for other in whole if other != name]
         assert_close(rest(UP, light, view), sum(part for other, part in whole.items() if other != name))
     assert (model(*parameters).components(UP, light, view)["specular"] == 0).all()
@@ -165,7 +166,7 @@ def test_parts_can_be_left_out():
 
 def test_mirror_lobe_is_drawn_with_its_reflectance():
     brdf = model(0.02, 1.0, 0.5, 0.77 + 6.08j)
-    sample = sampling_laws._Setting.of(brdf, 0.8).draw(2000, torch.Generator().manual_seed(0))
+    sample = laws.SamplingSetup.of(brdf, 0.8).draw(2000, torch.Generator().manual_seed(0))
     mirrored = sample.pdf.isinf()
     share = float(mirrored.double().mean())
     assert 0.5 < share < 1
@@ -176,7 +177,7 @@ def test_mirror_lobe_is_drawn_with_its_reflectance():
     assert model(0.02, 1.0, 0.5, 1.5, specular=False).delta_reflectance(brdf.cosines(UP, UP, UP)) is None
 
 
-# The spike over finite cones
+# The specular part over finite cones
 
 
 @pytest.mark.parametrize("case", GOLDEN["cap_overlap"])
@@ -212,7 +213,7 @@ def test_slope_of_the_cone_overlap():
     assert slope.isfinite().all()
 
 
-def test_spike_at_the_mirror_direction_and_in_all():
+def test_specular_part_at_the_mirror_direction_and_in_all():
     # rho_s/(cos dw) at its top; all of it together is rho_s, but for the width of the cone
     solid_angle = math.pi / 1024
     brdf = model(0.28, 1.77, 2.0, 2.15 + 20.7j, solid_angle=solid_angle, directional_diffuse=False)

@@ -8,8 +8,8 @@ from test_he_torrance import doubles, material
 from torch.testing import assert_close
 
 from torchbrdf import Cosines, HeTorrance, fixed, he_torrance, specular_reflectivity
-from torchbrdf.models.he_torrance.reflectance import directional_diffuse, mirror_reflectance
-from torchbrdf.models.he_torrance.spike import averaged_spike
+from torchbrdf.models.he_torrance.reflectance import directional_diffuse, unchecked_specular_reflectivity
+from torchbrdf.models.he_torrance.specular import averaged_specular
 from torchbrdf.testing import hard_directions, random_directions
 
 BOX = [
@@ -49,7 +49,9 @@ def test_derivatives_at_sigma0_zero():
     sigma0 = surface.pop("sigma0").requires_grad_()
     cosines = Cosines.of(*random_directions(4, dtype=torch.float64, generator=torch.Generator().manual_seed(0)))
     assert torch.autograd.gradcheck(lambda s: directional_diffuse(cosines, sigma0=s, **surface), sigma0)
-    assert torch.autograd.gradcheck(lambda s: mirror_reflectance(cosines.light, sigma0=s, **surface), sigma0)
+    assert torch.autograd.gradcheck(
+        lambda s: unchecked_specular_reflectivity(cosines.light, sigma0=s, **surface), sigma0
+    )
     assert torch.autograd.gradgradcheck(lambda s: directional_diffuse(cosines, sigma0=s, **surface), sigma0)
 
 
@@ -63,7 +65,7 @@ def test_only_ratios_of_lengths_count():
     assert slopes.sum().abs() < 1e-9 * slopes.abs().max()
 
 
-def test_derivatives_of_the_spike_and_of_the_albedo():
+def test_derivatives_of_the_specular_part_and_of_the_albedo():
     surface = {name: value.requires_grad_() for name, value in material(0.05, 0.7, 0.5, 0.77 + 6.08j).items()}
     theta = doubles([0.5, 0.9])
     offset = doubles([0.1, 0.3])
@@ -71,11 +73,11 @@ def test_derivatives_of_the_spike_and_of_the_albedo():
     view = torch.stack((-(theta + offset).sin(), 0.1 + 0 * theta, (theta + offset).cos()), -1).requires_grad_()
     up = doubles([0.0, 0.0, 1.0])
 
-    def spike(light, view, *values):
+    def averaged(light, view, *values):
         cosines = Cosines.of(up, light, view, normalize=True)
-        return averaged_spike(cosines, solid_angle=0.5, **dict(zip(surface, values, strict=True)))
+        return averaged_specular(cosines, solid_angle=0.5, **dict(zip(surface, values, strict=True)))
 
-    assert torch.autograd.gradcheck(spike, (light, view, *surface.values()), check_forward_ad=True)
+    assert torch.autograd.gradcheck(averaged, (light, view, *surface.values()), check_forward_ad=True)
     model = HeTorrance(**{name: value.detach() for name, value in surface.items()}, diffuse=doubles([0.02]))
     names = [name for name, _ in model.named_parameters()]
 
@@ -132,9 +134,9 @@ def assert_finite_everywhere(n, dtype, seed):
     up = torch.tensor([0.0, 0.0, 1.0], dtype=dtype)
     cosines = Cosines.of(up, light, view, normalize=True)
     for what, f in (
-        ("lobe", he_torrance(cosines, diffuse=torch.tensor([0.1], dtype=dtype), **surface)),
+        ("directional diffuse", he_torrance(cosines, diffuse=torch.tensor([0.1], dtype=dtype), **surface)),
         ("mirror", specular_reflectivity(cosines.light, **surface)),
-        ("spike", cosines.zero_below_horizon(averaged_spike(cosines, solid_angle=0.1, **surface))),
+        ("specular", cosines.zero_below_horizon(averaged_specular(cosines, solid_angle=0.1, **surface))),
     ):
         assert f.isfinite().all(), what
         assert (f >= 0).all(), what

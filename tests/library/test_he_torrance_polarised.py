@@ -10,7 +10,7 @@ from test_he_torrance import GOLDEN, SURFACES, UP, directions, doubles, material
 from torch.testing import assert_close
 
 from torchbrdf import Cosines, coherency, conductor, he_torrance, he_torrance_polarised, polarised_specular_reflectivity
-from torchbrdf.models.he_torrance.lobe import Geometry
+from torchbrdf.models.he_torrance.perfect_reflector import Geometry
 from torchbrdf.models.he_torrance.polarised import jones_matrix
 from torchbrdf.testing import random_directions
 

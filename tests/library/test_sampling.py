@@ -18,7 +18,6 @@ from torchbrdf import (
     Schlick,
     TorranceSparrow,
     fixed,
-    sampling_laws,
 )
 from torchbrdf import testing as laws
 
@@ -37,30 +36,28 @@ def held(value):
 
 @pytest.mark.parametrize("angle", ANGLES)
 def test_samples_follow_pdf(model, angle):
-    sampling_laws.assert_samples_follow_pdf(
-        model.make(torch.float64), angle, false_alarm=FALSE_ALARM, generator=seeded()
-    )
+    laws.assert_samples_follow_pdf(model.make(torch.float64), angle, false_alarm=FALSE_ALARM, generator=seeded())
 
 
 @pytest.mark.parametrize("angle", [0.0, math.radians(85)])
 def test_density_integrates(model, angle):
-    sampling_laws.assert_density_integrates(model.make(torch.float64), angle, generator=seeded())
+    laws.assert_density_integrates(model.make(torch.float64), angle, generator=seeded())
 
 
 @pytest.mark.parametrize("angle", [0.0, *ANGLES, math.radians(89.9)])
 def test_weight_is_f_cos_over_pdf(model, angle):
-    sampling_laws.assert_weights(model.make(torch.float64), angle, generator=seeded())
+    laws.assert_weights(model.make(torch.float64), angle, generator=seeded())
 
 
 def test_mean_weight_is_the_directional_albedo(model):
     # five standard errors: a false alarm in 1.7 million tests
     brdf = model.make(torch.float64)
     angle = 1.0
-    setting = sampling_laws._Setting.of(brdf, angle)
+    setting = laws.SamplingSetup.of(brdf, angle)
     with torch.no_grad():
         weight = setting.draw(20_000, seeded()).weight
     if brdf.anisotropic:  # `directional_albedo` takes the view along the grain
-        expected = by_quadrature(brdf, angle, azimuth=sampling_laws._AZIMUTH).mean
+        expected = by_quadrature(brdf, angle, azimuth=laws.AZIMUTH).mean
     else:
         expected = brdf.directional_albedo(torch.tensor(math.cos(angle), dtype=torch.float64), nodes=192).detach()
     allowed = 5 * weight.std(0) / math.sqrt(len(weight)) + max(5e-5, model.albedo_error / 20)
@@ -91,7 +88,7 @@ def highlight():
 def test_weights_of_facets_never_exceed_their_reflectance():
     for brdf in (facets(0.3), facets(1.0), GGX(alpha=held(0.5), fresnel=Perfect()), highlight()):
         for angle in (0.0, *ANGLES, math.radians(89.9)):
-            weight = sampling_laws._Setting.of(brdf, angle).draw(5000, seeded()).weight
+            weight = laws.SamplingSetup.of(brdf, angle).draw(5000, seeded()).weight
             assert weight.max() <= 1 + 1e-9
 
 
@@ -107,7 +104,7 @@ def test_mirror_returns_the_reflected_view():
 def test_delta_lobes_survive_in_sums():
     brdf = 0.5 * Mirror() + 0.5 * Lambert(albedo=held(0.6))
     brdf = brdf.double()
-    _, pdf, weight = sampling_laws._Setting.of(brdf, 1.0).draw(20_000, seeded())
+    _, pdf, weight = laws.SamplingSetup.of(brdf, 1.0).draw(20_000, seeded())
     delta = pdf.isinf()
     assert abs(float(delta.double().mean()) - 0.5) < 5 * math.sqrt(0.25 / 20_000)
     assert abs(float(weight.detach().mean()) - 0.8) < 0.01
@@ -117,7 +114,7 @@ def test_gradient_of_the_mean_weight_is_that_of_the_albedo():
     # light and pdf are held, so the derivative passes through f_r: unbiased, five standard errors allowed
     brdf = GGX(alpha=torch.tensor(0.5, dtype=torch.float64), fresnel=Perfect())
     angle = 1.0
-    setting = sampling_laws._Setting.of(brdf, angle)
+    setting = laws.SamplingSetup.of(brdf, angle)
     (got,) = torch.autograd.grad(setting.draw(200_000, seeded()).weight.mean(), list(setting.brdf.parameters()))
     albedo = brdf.directional_albedo(torch.tensor(math.cos(angle), dtype=torch.float64), nodes=256)
     (expected,) = torch.autograd.grad(albedo.sum(), list(brdf.parameters()))
@@ -141,9 +138,9 @@ class Leaky(Skewed):
 
 def test_laws_notice():
     with pytest.raises(AssertionError, match="chi-square"):
-        sampling_laws.assert_samples_follow_pdf(Skewed(), 1.0, generator=seeded())
+        laws.assert_samples_follow_pdf(Skewed(), 1.0, generator=seeded())
     with pytest.raises(AssertionError, match=r"integrates to 0\.9 and misses 0"):
-        sampling_laws.assert_density_integrates(Leaky(), 1.0, generator=seeded())
+        laws.assert_density_integrates(Leaky(), 1.0, generator=seeded())
 
 
 def test_anisotropic_models_ask_for_a_tangent():

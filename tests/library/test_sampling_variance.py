@@ -32,8 +32,8 @@ from torchbrdf import (
     UnidirectionalVCavities,
     fixed,
     gaussian_weights,
-    sampling_laws,
 )
+from torchbrdf import testing as laws
 
 
 def seeded(seed=0):
@@ -45,7 +45,7 @@ def held(value):
 
 
 def statistics(brdf, angle, draws=60_000):
-    setting = sampling_laws._Setting.of(brdf, angle)
+    setting = laws.SamplingSetup.of(brdf, angle)
     with torch.no_grad():
         w = setting.draw(draws, seeded()).weight[:, 0]
     return float(w.var() / w.mean() ** 2), float(w.max() / w.mean())

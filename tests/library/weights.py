@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf import BRDF, Oriented
-from torchbrdf import testing as laws
+from torchbrdf.testing import laws
 
 
 class Weights(NamedTuple):
@@ -25,8 +25,8 @@ def by_quadrature(brdf: BRDF, angle: float, *, azimuth: float = 0.0, uniform: fl
     """
     brdf = brdf.brdf if isinstance(brdf, Oriented) else brdf
     # a panel for the last two degrees: rough surfaces brighten there
-    theta, theta_weight = laws._panels(sorted({0.0, angle, math.radians(88), math.pi / 2}), 16)
-    phi, phi_weight = laws._panels([azimuth + k * math.pi / 2 for k in range(5)], 12)
+    theta, theta_weight = laws.panels(sorted({0.0, angle, math.radians(88), math.pi / 2}), 16)
+    phi, phi_weight = laws.panels([azimuth + k * math.pi / 2 for k in range(5)], 12)
     sin, cos = theta.sin()[:, None], theta.cos()[:, None]
     light = torch.stack(torch.broadcast_tensors(sin * phi.cos(), sin * phi.sin(), cos), -1).reshape(-1, 3)
     area = (sin * theta_weight[:, None] * phi_weight).reshape(-1)

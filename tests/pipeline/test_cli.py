@@ -8,8 +8,8 @@ import sys
 import numpy as np
 import pytest
 
+from inverse import read_image, read_stack
 from inverse.cli import main
-from inverse.files.stacks import read_image, read_stack
 
 
 def refuse(text):
@@ -88,6 +88,28 @@ def test_options_reach_the_fit(folder, tmp_path, capsys):
     decoded = strict_json(capsys.readouterr().out)
     assert fewer < decoded["samples"]
     assert decoded["albedo"][0] < 0.45  # 0.6 encoded is 0.32 linear
+
+
+def test_the_exposure_is_that_of_the_folder_unless_given(tmp_path, capsys):
+    options = ["--output", str(tmp_path / "s"), "--model", "lambert", "--albedo", "0.5", "--size", "16"]
+    assert main(["render", *options, "--exposure", "1.5"]) == 0
+    albedo = {}
+    for given in ([], ["--exposure", "1.5"], ["--exposure", "3"]):
+        capsys.readouterr()
+        assert main(["fit", str(tmp_path / "s"), "--model", "lambert", "--json", *given]) == 0
+        (albedo[tuple(given)],) = strict_json(capsys.readouterr().out)["albedo"]
+    assert list(albedo.values()) == pytest.approx([0.5, 0.5, 0.25], abs=1e-4)
+
+
+def test_render_overwrites_when_asked(tmp_path, capsys):
+    options = ["render", "--output", str(tmp_path / "s"), "--size", "16", "--albedo"]
+    assert main([*options, "0.5"]) == 0
+    before = read_image(tmp_path / "s" / "image_0.png")
+    assert main([*options, "0.9"]) == 2
+    assert "exists and is not empty" in capsys.readouterr().err
+    assert read_image(tmp_path / "s" / "image_0.png").equal(before)
+    assert main([*options, "0.9", "--overwrite"]) == 0
+    assert (read_image(tmp_path / "s" / "image_0.png") > before).any()
 
 
 @pytest.mark.parametrize("geometry", ["sphere", "cylinder", "plane"])

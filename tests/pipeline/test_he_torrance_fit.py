@@ -71,7 +71,7 @@ def test_a_longer_wavelength_tells_them_apart():
     assert abs(found.parameters["sigma0"].item() - 4) < 4 * found.standard_error["sigma0"].item()
 
 
-def test_spike_alone_pulls_no_start_that_is_too_rough():
+def test_specular_part_alone_pulls_no_start_that_is_too_rough():
     # e^-g underflows, and with it the gradient: the fit says so instead of calling the start an answer
     parts = {"solid_angle": 0.01, "directional_diffuse": False}
     measured = scans(aluminium(0.05, 1.77, (0.5, 2.0), **parts))

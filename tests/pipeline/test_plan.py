@@ -92,12 +92,15 @@ def test_every_pixel_is_within_the_tolerance(name, tolerance):
 
 
 @pytest.mark.slow
-def test_grid_of_scenes_is_within_the_tolerance(capsys):
-    """The study of the example: scenes drawn from all shapes, lights, materials."""
+def test_grid_of_scenes_is_within_the_tolerance(capsys, monkeypatch):
+    """The study of `examples/benchmarks/plans.py`: scenes drawn from all shapes, lights, materials."""
     import runpy
+    import sys
     from pathlib import Path
 
-    runpy.run_path(str(Path(__file__).parents[2] / "examples" / "07_only_what_matters.py"))["grid"](24, 64)
+    monkeypatch.setattr(sys, "argv", ["plans.py", "--scenes", "24"])
+    script = Path(__file__).parents[2] / "examples" / "benchmarks" / "plans.py"
+    runpy.run_path(str(script), run_name="__main__")
     lines = capsys.readouterr().out.splitlines()
     shares = [float(line.split("largest error ")[1].split()[0]) for line in lines]
     assert len(shares) == 3

@@ -1,5 +1,6 @@
-"""Folders of photographs read back, every bad folder says what is wrong, and `usable` keeps to its angles."""
+"""Folders of photographs read back as they were written, and every bad folder says what is wrong."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,29 @@ import torch
 from PIL import Image
 from png_files import png_bytes
 
-from inverse.files.stacks import read_stack, usable, write_stack
-from inverse.scene.lights import Ambient, Distant
-from inverse.scene.scene import Scene
-from inverse.scene.surface import sphere, vase
+from inverse import (
+    Ambient,
+    Arrival,
+    Disc,
+    Distant,
+    Environment,
+    Light,
+    Point,
+    Scene,
+    Sensor,
+    Sphere,
+    StoredLight,
+    fit,
+    perspective,
+    pinhole,
+    read_stack,
+    render,
+    sphere,
+    usable,
+    vase,
+    write_stack,
+)
+from torchbrdf import OrenNayar
 
 GRAY_SPHERE = Path(__file__).parents[3] / "shared" / "data" / "gray_sphere"
 
@@ -187,12 +207,130 @@ def test_written_stack_reads_back(tmp_path, bits):
     torch.testing.assert_close(photos.images, images, atol=0.5001 / (2**bits - 1), rtol=0)
     assert torch.equal(photos.scene.surface.mask, surface.mask)
     torch.testing.assert_close(photos.scene.surface.normals, surface.normals)
-    for (found,), given in zip(photos.scene.lights, lights, strict=True):
-        torch.testing.assert_close(found.direction, given.direction, rtol=1e-15, atol=1e-16)
-        assert found.irradiance == given.irradiance
-    write_stack(tmp_path / "new", photos.images, photos.scene, bits)
+    assert torch.equal(photos.scene.surface.points[surface.mask], surface.points[surface.mask])
+    for (read,), given in zip(photos.scene.lights, lights, strict=True):
+        assert torch.equal(read.direction, given.direction)
+        assert read.irradiance == given.irradiance
+    write_stack(tmp_path / "new", photos.images, photos.scene, bits, overwrite=True)
     again = read_stack(tmp_path / "new")
     assert torch.equal(again.images, photos.images)
+
+
+def test_written_stack_keeps_the_sensor(tmp_path):
+    """Read back with an exposure of 1, a fit took albedo 0.7 of exposure 3 for 1 and sigma 40 deg for 18."""
+    sensor = Sensor(exposure=3.0, psf_sigma=0.7, read_noise=1 / 300, full_well=20000.0, bits=12)
+    scene = Scene(vase(32, 32), [Distant.from_angle(0), Distant.from_angle(30)], sensor)
+    truth = OrenNayar(albedo=0.7, sigma=0.7)
+    images = sensor.expose(render(scene, truth), torch.Generator().manual_seed(0)).detach()
+    write_stack(tmp_path / "new", images, scene)
+    photos = read_stack(tmp_path / "new")
+    assert photos.sensor_stated
+    assert photos.scene.sensor == sensor
+    fitted = fit(photos.scene, photos.images, OrenNayar())
+    for name, value in {"albedo": 0.7, "sigma": 0.7}.items():  # 5 standard errors
+        assert abs(fitted.parameters[name].item() - value) < 5 * fitted.standard_error[name].item() < 0.2
+
+
+def test_a_folder_without_a_sensor_says_so(folder):
+    photos = read_stack(folder)
+    assert not photos.sensor_stated
+    assert photos.scene.sensor == Sensor()
+    (folder / "stack.json").write_text('{"sensor": {"exposure": 2.5}}')
+    assert read_stack(folder).scene.sensor == Sensor(exposure=2.5)
+    assert len(read_stack(folder).scene.lights) == 2  # of lights.txt
+
+
+class Ring(Light):
+    """A user's own: eight directions at 30 degrees around the camera, and a glow."""
+
+    uniform = 0.02
+
+    def arrivals(self, points):
+        for k in range(8):
+            azimuth = 2 * math.pi * k / 8
+            direction = points.new_tensor([math.cos(azimuth) / 2, math.sin(azimuth) / 2, math.sqrt(0.75)])
+            yield Arrival(direction.expand(len(points), 3), points.new_full((len(points), 1), 0.1 * (k + 1)))
+
+
+class TwoLamps(Light):
+    """A user's own: what arrives depends on the point, so it says which lamps it is."""
+
+    lamps = Point(torch.tensor([1.0, 0.0, 3.0]), 5.0), Point(torch.tensor([-1.0, 1.0, 4.0]), 3.0)
+
+    def arrivals(self, points):
+        for lamp in self.lamps:
+            yield from lamp.arrivals(points)
+
+    def stored(self, points):
+        return StoredLight(
+            positions=torch.stack([lamp.position for lamp in self.lamps]), intensities=torch.tensor([[5.0], [3.0]])
+        )
+
+
+class Spot(Light):
+    """A user's own that depends on the point and does not say how."""
+
+    def arrivals(self, points):
+        yield Arrival(points.new_tensor([0.0, 0.0, 1.0]), (points[:, :1] > 0).to(points))
+
+
+SKY = torch.rand(4, 8, 3, generator=torch.Generator().manual_seed(1))
+COLOURED = torch.tensor([1.0, 0.5, 0.25])
+
+
+@pytest.mark.parametrize(
+    "lights",
+    [
+        Distant.from_angle(20, 1 / 3),
+        Distant.from_angle(20, COLOURED),
+        Point(torch.tensor([1.0, 2.0, 3.0]), 7.0),
+        Point(torch.tensor([1.0, 2.0, 3.0]), COLOURED),
+        Disc(torch.tensor([0.3, 0.2, 1.0]), 0.4, COLOURED),
+        Environment(SKY),
+        Ambient(0.1),
+        Ambient(COLOURED),
+        (Distant.from_angle(0), Distant.from_angle(50, COLOURED), Ambient(0.1)),
+        Ring(),
+        TwoLamps(),
+    ],
+    ids=lambda k: type(k).__name__,
+)
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_written_stack_keeps_every_light(tmp_path, lights, dtype):
+    """The scene read back sends the same light to the camera; shadows aside, for which a folder has no solid."""
+    scene = Scene(sphere(16, 16, dtype=dtype), [lights, lights], shadows=False)
+    write_stack(tmp_path / "new", torch.full((2, 16, 16, 3), 0.5), scene)
+    read = read_stack(tmp_path / "new", dtype=dtype).scene
+    model = OrenNayar(albedo=0.7, sigma=0.7).to(dtype)
+    expected = render(scene, model).detach()
+    eps = torch.finfo(dtype).eps  # the sum of up to 36 rays, in another order
+    torch.testing.assert_close(render(read, model).detach().expand_as(expected), expected, rtol=40 * eps, atol=eps)
+    write_stack(tmp_path / "again", torch.full((2, 16, 16, 3), 0.5), read)
+    again = read_stack(tmp_path / "again", dtype=dtype).scene
+    assert torch.equal(render(again, model), render(read, model))
+
+
+def test_written_stack_keeps_the_pinhole_and_its_lamp(tmp_path):
+    surface = perspective(Sphere(0.5), pinhole(20, 20, field_of_view=40, distance=2.0), dtype=torch.float64)
+    scene = Scene(surface, [Point(torch.tensor([1.0, 1.0, 2.0]).double(), 3.0)], shadows=False)
+    write_stack(tmp_path / "new", torch.full((1, 20, 20, 1), 0.5), scene)
+    read = read_stack(tmp_path / "new", dtype=torch.float64).scene
+    model = OrenNayar(albedo=0.7, sigma=0.7).double()
+    torch.testing.assert_close(render(read, model).detach(), render(scene, model).detach(), rtol=1e-14, atol=1e-15)
+
+
+def test_lights_follow_the_names_of_their_images(tmp_path):
+    lights = [Distant.from_angle(angle, 1.0 + angle) for angle in (0, 10, 20)]
+    write_stack(tmp_path / "new", torch.full((3, 8, 8, 1), 0.5), Scene(sphere(8, 8), lights))
+    ((light,),) = read_stack(tmp_path / "new", images="image_1*").scene.lights
+    assert light.irradiance == 11.0
+
+
+def test_lights_of_a_text_may_be_coloured(folder):
+    (folder / "lights.txt").write_text("0 0 1 1 .5 .25\n0.6 0 0.8\n")
+    (first,), (second,) = read_stack(folder).scene.lights
+    assert first.irradiance.tolist() == [1, 0.5, 0.25]
+    assert second.irradiance == 1.0
 
 
 def test_written_stack_keeps_full_pixels_only(tmp_path):
@@ -207,56 +345,38 @@ def test_written_stack_keeps_full_pixels_only(tmp_path):
 @pytest.mark.parametrize(
     ("lights", "message"),
     [
-        ([Ambient(0.1)], "image 0"),
-        ([[Distant.from_angle(0), Distant.from_angle(5)]], "one distant light"),
-        ([Distant.from_angle(0, torch.ones(3))], "scalar irradiance"),
+        ([Spot()], "Spot cannot be stored: what arrives depends on the point"),
         ([Distant.from_angle(0)] * 2, "images must have shape"),
     ],
 )
-def test_refuses_to_write_what_the_layout_cannot_hold(tmp_path, lights, message):
+def test_refuses_to_write_what_no_folder_can_hold(tmp_path, lights, message):
     with pytest.raises(ValueError, match=message):
-        write_stack(tmp_path, torch.full((1, 8, 8, 1), 0.5), Scene(sphere(8, 8), lights))
+        write_stack(tmp_path / "new", torch.full((1, 8, 8, 1), 0.5), Scene(sphere(8, 8), lights))
+    assert list(tmp_path.iterdir()) == []
 
 
-def test_refuses_to_join_another_stack(folder):
-    with pytest.raises(FileExistsError, match=r"holds other images.*image2\.png, image10\.png"):
-        write_stack(folder, torch.full((1, 8, 8, 1), 0.5), Scene(sphere(8, 8), [Distant.from_angle(0)]))
-
-
-# --- usable -----------------------------------------------------------------------------------------------
-
-
-def test_usable_by_angles():
-    surface = sphere(41, 41, dtype=torch.float64)
-    angles = (-35.0, 0.0, 50.0)
-    scene = Scene(surface, [Distant.from_angle(a) for a in angles])
-    found = usable(scene, limb=60, highlight=12, shadow=75)
-    nx, _, nz = (k.numpy() for k in surface.normals.unbind(-1))
-    for image, angle in zip(found, np.radians(angles), strict=True):
-        seen = np.degrees(np.arccos(nz))
-        lit = np.degrees(np.arccos(np.clip(nx * np.sin(angle) + nz * np.cos(angle), -1, 1)))
-        # half vector of horizontal light and view: at half the angle
-        half = np.degrees(np.arccos(np.clip(nx * np.sin(angle / 2) + nz * np.cos(angle / 2), -1, 1)))
-        expected = surface.mask.numpy() & (seen <= 60) & (lit <= 75) & (half > 12)
-        np.testing.assert_array_equal(image.numpy(), expected)
-
-
-def test_usable_takes_every_light_and_sample():
-    left, right = Distant.from_angle(-50), Distant.from_angle(50)
-    both = usable(Scene(sphere(21, 21), [[left, right, Ambient(0.1)]]))[0]
-    each = usable(Scene(sphere(21, 21), [left, right]))
-    assert torch.equal(both, each.all(0))
-    fine = usable(Scene(sphere(21, 21, samples=4), [left]))
-    assert fine.shape == (1, 21, 21)
-    assert not (fine[0] & ~each[0] & (sphere(21, 21, samples=4).coverage() < 1)).any()
-
-
-def test_usable_refuses():
-    scene = Scene(sphere(21, 21), [Distant.from_angle(0)])
-    with pytest.raises(ValueError, match=r"limits must lie in \[0, 90\] degrees; found limb 95"):
-        usable(scene, limb=95)
-    with pytest.raises(ValueError, match=r"no pixel is left with limb 30.*highlight 40"):
-        usable(scene, limb=30, highlight=40)
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "stack.json: "),
+        ("[]", "stack.json: must be"),
+        ('{"exposure": 3}', "stack.json: must be"),
+        ('{"sensor": {"gain": 3}}', "stack.json: .*gain"),
+        ('{"sensor": {"exposure": -3}}', r"stack.json: Sensor\.exposure must be positive and finite; found -3"),
+        ('{"lights": {"image2.png": [{"uniform": 1}]}}', "stack.json: has no lights for the images image10.png"),
+        ('{"lights": [1]}', "stack.json: "),
+        ('{"lights": {"image2.png": [{"glow": 1}]}}', "stack.json: lights of image2.png: .*glow"),
+        ('{"lights": {"image2.png": [{"directions": [[0, 0, 1]]}]}}', "irradiances with its directions"),
+        ('{"lights": {"image2.png": [{"directions": [[0, 0, 2]], "irradiances": [[1]]}]}}', "must be unit vectors"),
+        ('{"lights": {"image2.png": [{"directions": [[0, 0, 1]], "irradiances": [[-1]]}]}}', "not negative"),
+        ('{"lights": {"image2.png": [{"positions": [0, 0, 1], "intensities": [[1]]}]}}', r"positions \(lamp, 3\)"),
+        ('{"lights": {"image2.png": [{}]}}', "found none of them"),
+    ],
+)
+def test_bad_stack_file(folder, text, message):
+    (folder / "stack.json").write_text(text)
+    with pytest.raises(ValueError, match=message):
+        read_stack(folder)
 
 
 @pytest.mark.skipif(not GRAY_SPHERE.is_dir(), reason=f"the photographs are not at {GRAY_SPHERE}")

@@ -11,8 +11,10 @@ from torchbrdf.accuracy.ladders import (
     ladder,
     reference,
     relative_errors,
+    rungs_of,
 )
 from torchbrdf.accuracy.series import (
+    SCHEMES,
     SeriesLadder,
     SeriesRow,
     expanded,
@@ -21,6 +23,7 @@ from torchbrdf.accuracy.series import (
 
 __all__ = [
     "RUNGS",
+    "SCHEMES",
     "Ladder",
     "Row",
     "Rung",
@@ -33,5 +36,6 @@ __all__ = [
     "ladder",
     "reference",
     "relative_errors",
+    "rungs_of",
     "series_ladder",
 ]

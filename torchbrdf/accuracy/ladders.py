@@ -15,12 +15,9 @@ from torch import Tensor
 
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.linear import LinearBRDF
-from torchbrdf.models.lambert import Lambert
-from torchbrdf.models.oren_nayar.fast import FastRoughSurface
-from torchbrdf.models.oren_nayar.functional import OrenNayar
+from torchbrdf.linear import PIXELS_AT_A_TIME, ImageBRDF, LinearBRDF
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
-from torchbrdf.models.oren_nayar.rough_surface import BounceCount, ClosedFormRoughSurface, RoughSurface
+from torchbrdf.models.oren_nayar.rough_surface import ClosedFormRoughSurface, RoughSurface
 
 Build = Callable[[Tensor, Tensor], BRDF]
 
@@ -34,31 +31,58 @@ class Rung:
     points: int = 1 << 17
 
 
-_BOUNCES: tuple[tuple[BounceCount, str], ...] = ((1, "1 bounce"), (2, "2 bounces"), ("all", "all bounces"))
+def rungs_of(name: str, build: Build) -> tuple[Rung, ...]:
+    """The ladder of a model of one albedo and one sigma: its stand-ins, as it states them, and itself on top.
+
+    Args:
+        name: of the model itself.
+        build: makes the model from albedo [-] and sigma [rad], both scalars.
+    """
+    sample = build(torch.tensor(0.5), torch.tensor(0.3))
+    groups = {group: [option.choice for option in options] for group, options in sample.stand_ins().items()}
+
+    def stand_in(group: str, place: int) -> Build:
+        return lambda albedo, sigma: build(albedo, sigma).stand_ins()[group][place].model
+
+    simpler = [
+        _rung(choice, stand_in(group, place))
+        for group, choices in groups.items()
+        for place, choice in enumerate(choices)
+    ]
+    return (*simpler, _rung(name, build))
 
 
-def _exact(nodes: int, bounces: BounceCount) -> Build:
-    return lambda albedo, sigma: RoughSurface(albedo=albedo, sigma=sigma, nodes=nodes, bounces=bounces)
+def _rung(name: str, build: Build) -> Rung:
+    """Models of many images are timed on as many points as they take at a time."""
+    many = isinstance(build(torch.tensor(0.5), torch.tensor(0.3)), ImageBRDF)
+    return Rung(name, build, PIXELS_AT_A_TIME) if many else Rung(name, build)
 
 
-RUNGS = (
-    Rung("Lambert", lambda albedo, sigma: Lambert(albedo=albedo)),
-    Rung("qualitative (0.33)", lambda albedo, sigma: QualitativeOrenNayar(albedo=albedo, sigma=sigma)),
-    Rung("qualitative (0.57)", lambda albedo, sigma: QualitativeOrenNayar(albedo=albedo, sigma=sigma, a_constant=0.57)),
-    Rung("functional", lambda albedo, sigma: OrenNayar(albedo=albedo, sigma=sigma)),
-    Rung("closed form, K = 16", lambda albedo, sigma: ClosedFormRoughSurface(albedo=albedo, sigma=sigma), 1 << 12),
-    Rung("fast, 2 bounces", lambda albedo, sigma: FastRoughSurface(albedo=albedo, sigma=sigma, bounces=2)),
-    Rung("fast, all bounces", lambda albedo, sigma: FastRoughSurface(albedo=albedo, sigma=sigma, bounces="all")),
-    *(
-        Rung(
-            f"exact, K = {nodes}, {label}",
-            _exact(nodes, bounces),
-            1 << 12,
-        )
-        for nodes in (4, 8, 16, 48)
-        for bounces, label in _BOUNCES
-    ),
-)
+def _of_the_paper() -> tuple[Rung, ...]:
+    """The ladder of the exact model of 48 slopes; beside two of its rungs, what is simulated by other formulas."""
+    exact = rungs_of(
+        "exact, K = 48, all bounces",
+        lambda albedo, sigma: RoughSurface(albedo=albedo, sigma=sigma, nodes=48, bounces="all"),
+    )
+    beside: dict[str, tuple[str, Build]] = {
+        "qualitative (0.33)": (
+            "qualitative (0.57)",
+            lambda albedo, sigma: QualitativeOrenNayar(albedo=albedo, sigma=sigma, a_constant=0.57),
+        ),
+        "functional": (
+            "closed form, K = 16",
+            lambda albedo, sigma: ClosedFormRoughSurface(albedo=albedo, sigma=sigma),
+        ),
+    }
+    ladder: list[Rung] = []
+    for rung in exact:
+        ladder.append(rung)
+        if rung.name in beside:
+            ladder.append(_rung(*beside[rung.name]))
+    return tuple(ladder)
+
+
+RUNGS = _of_the_paper()
 
 
 def reference(albedo: Tensor, sigma: Tensor) -> RoughSurface:
@@ -119,6 +143,7 @@ def ladder(
     cosines: Cosines,
     *,
     rungs: Sequence[Rung] = RUNGS,
+    against: Build = reference,
     repeats: int = 9,
     compiled: bool = False,
 ) -> Ladder:
@@ -128,7 +153,8 @@ def ladder(
         sigma: roughness, or several. [rad]
         rho: facet albedo, or several; every sigma is taken with every rho. [-]
         cosines: of the directions to judge by, (...); those below the horizon do not count.
-        rungs: models to compare; the first is the unit of time.
+        rungs: models to compare; the first is the unit of time. `rungs_of` lists those of a model of your own.
+        against: builds what they are compared with.
         repeats: timings of each, interleaved; the median counts.
         compiled: time the models under torch.compile.
     Returns: Ladder. Errors are computed in float64, times in the dtype of the cosines, saved bytes in eager mode.
@@ -140,13 +166,19 @@ def ladder(
     products = [c[kept] for c in (cosines.light, cosines.view, cosines.phase)]
     sigmas = [sigma] if isinstance(sigma, float | int) else list(sigma)
     rhos = [rho] if isinstance(rho, float | int) else list(rho)
-    errors = relative_errors(rungs, sigmas, rhos, Cosines.from_products(*(c.double() for c in products)))
+    wide = Cosines.from_products(*(c.double() for c in products))
+    errors = relative_errors(rungs, sigmas, rhos, wide, against=against)
     costs = cost(rungs, sigmas[0], rhos[0], Cosines.from_products(*products), repeats=repeats, compiled=compiled)
     return Ladder(tuple(Row(rung.name, *errors[rung.name], *costs[rung.name]) for rung in rungs))
 
 
 def relative_errors(
-    rungs: Sequence[Rung], sigmas: Sequence[float], rhos: Sequence[float], cosines: Cosines
+    rungs: Sequence[Rung],
+    sigmas: Sequence[float],
+    rhos: Sequence[float],
+    cosines: Cosines,
+    *,
+    against: Build = reference,
 ) -> dict[str, tuple[float, float]]:
     """By name: max and rms relative error over all directions (...) and every sigma with every rho."""
     squares: dict[str, list[float]] = {rung.name: [] for rung in rungs}
@@ -164,7 +196,7 @@ def relative_errors(
         for sigma in sigmas:
             for rho in rhos:
                 material = [torch.tensor(k, dtype=cosines.light.dtype) for k in (rho, sigma)]
-                truth = evaluate("reference", reference(*material))
+                truth = evaluate("", against(*material))
                 for rung in rungs:
                     error = evaluate(rung.name, rung.build(*material)) / truth - 1
                     largest[rung.name].append(error.abs().max().item())
@@ -193,7 +225,7 @@ def cost(
     # all rungs share the code of `evaluate`: with and without gradients, each needs its own compilation
     with torch._dynamo.config.patch(recompile_limit=4 * len(rungs)) if compiled else nullcontext():  # pyright: ignore
         seconds = [interleaved_medians(calls, repeats) for calls in (forward, backward)]
-    unit = [found[rungs[0].name] for found in seconds]
+    unit = [medians[rungs[0].name] for medians in seconds]
     return {
         rung.name: (seconds[0][rung.name] / unit[0], seconds[1][rung.name] / unit[1], saved[rung.name])
         for rung in rungs
@@ -219,7 +251,7 @@ def forward_ratios(models: Mapping[str, BRDF], cosines: Cosines, *, repeats: int
     with torch.no_grad():
         seconds = interleaved_medians({name: (lambda m=m: call(m), 1) for name, m in models.items()}, repeats, clock)
     unit = next(iter(seconds.values()))
-    return {name: found / unit for name, found in seconds.items()}
+    return {name: second / unit for name, second in seconds.items()}
 
 
 def interleaved_medians(
@@ -237,7 +269,7 @@ def interleaved_medians(
             call()
             _wait()
             times[name].append((clock() - began) / count)
-    return {name: statistics.median(found) for name, found in times.items()}
+    return {name: statistics.median(taken) for name, taken in times.items()}
 
 
 def _wait() -> None:

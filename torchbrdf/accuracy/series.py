@@ -106,8 +106,8 @@ def series_ladder(
         seconds = interleaved_medians(calls, repeats, time.process_time)
         errors = {name: (scheme(g, t).double() / exact - 1).abs()[seen] for name, scheme in schemes.items()}
     rows = []
-    for name, found in errors.items():
-        error = found.nan_to_num(nan=torch.inf)
+    for name, scheme_errors in errors.items():
+        error = scheme_errors.nan_to_num(nan=torch.inf)
         largest = error.new_zeros(bins).scatter_reduce(0, place, error, "amax")
         wrong = (error > _WRONG).double().mean().item()
         rows.append(SeriesRow(name, tuple(largest.tolist()), wrong, seconds[name] / seconds["Lambert"]))

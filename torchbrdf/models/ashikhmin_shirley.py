@@ -50,7 +50,8 @@ class AshikhminShirley(BRDF):
     Components: diffuse, specular.
     Deviations: loses energy: with F = 1 the specular albedo is 0.25 (n = 1) to 0.996 (n = 1000) at normal
         incidence, about half at grazing.
-    Source: Ashikhmin & Shirley 2000; Fundamentals of Computer Graphics, eqs. (25.4)-(25.6).
+    Source: Ashikhmin & Shirley 2000, "An anisotropic Phong BRDF model", DOI 10.1080/10867651.2000.10487522; Shirley &
+        Marschner 2009, Fundamentals of Computer Graphics, 3rd edition, eqs. (25.4)-(25.7).
     """
 
     diffuse: Constrained = Constrained(ALBEDO)

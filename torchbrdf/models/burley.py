@@ -31,7 +31,8 @@ def burley(cosines: Cosines, *, albedo: Tensor, roughness: Tensor, renormalised:
     Raises: ValueError when albedo or roughness leave their domains.
     Deviations: as published does not conserve energy (directional albedo 1.46 at cosine 0.05, R = 1). Renormalised
         it stays below 0.97 down to cosine 0.05 and reaches 1.03 at grazing.
-    Source: Burley 2012; Lagarde & de Rousiers 2014.
+    Source: Burley 2012, "Physically based shading at Disney", course DOI 10.1145/2343483.2343493; renormalised: Lagarde
+        & de Rousiers 2014, "Moving Frostbite to physically based rendering", course DOI 10.1145/2614028.2615431.
     """
     ALBEDO.check("burley: albedo", albedo)
     BURLEY_ROUGHNESS.check("burley: roughness", roughness)

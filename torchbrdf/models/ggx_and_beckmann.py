@@ -1,12 +1,13 @@
 """Microfacet models with Smith masking: GGX and Beckmann, isotropic and anisotropic."""
 
-from typing import final
+from typing import Any, ClassVar, final
 
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import BRDF
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import Cosines
+from torchbrdf.effects import ANISOTROPY, FRESNEL_VARIATION
 from torchbrdf.facets import (
     HalfVector,
     Masking,
@@ -20,7 +21,7 @@ from torchbrdf.facets import (
     tangent_squared,
 )
 from torchbrdf.fresnel import Fresnel, Schlick
-from torchbrdf.parameters import WIDTH, Constrained, fixed
+from torchbrdf.parameters import WIDTH, Constrained, declared, fixed, kept
 from torchbrdf.sampling import mirrored, visible_beckmann_facet, visible_ggx_facet
 
 
@@ -62,6 +63,15 @@ class _Microfacet(BRDF):
         seen = 1 / (1 + self.smith_lambda(of_view))
         return self.distribution(HalfVector.of(cosines)) * seen / (4 * cosines.view)
 
+    def stand_ins(self) -> dict[str, list[Option]]:
+        """The same facets with one reflectance at every angle."""
+        flat = self.fresnel.at_every_angle()
+        if flat is None:
+            return {}
+        widths: dict[str, Any] = {entry.name: kept(self, entry.name) for entry in declared(self)}
+        stand_in = type(self)(**widths, fresnel=flat, masking=self.masking)
+        return {FRESNEL_VARIATION: [Option("the reflectance of normal incidence", (FRESNEL_VARIATION,), stand_in)]}
+
 
 class _Isotropic(_Microfacet):
     alpha: Constrained = Constrained(WIDTH)
@@ -90,6 +100,7 @@ class _Anisotropic(_Microfacet):
     alpha_x: Constrained = Constrained(WIDTH)
     alpha_y: Constrained = Constrained(WIDTH)
     anisotropic = True
+    isotropic: ClassVar[type[_Isotropic]]
 
     def __init__(
         self,
@@ -112,6 +123,13 @@ class _Anisotropic(_Microfacet):
         view = ((ax * plane.view_tangent) ** 2 + (ay * plane.view_bitangent) ** 2) / (c.view * c.view)
         return light, view
 
+    def stand_ins(self) -> dict[str, list[Option]]:
+        """The isotropic model of the mean width, and one reflectance at every angle."""
+        alpha = (self.alpha_x * self.alpha_y).sqrt().detach()
+        held = all(isinstance(kept(self, name), fixed) for name in ("alpha_x", "alpha_y"))
+        rounded = self.isotropic(alpha=fixed(alpha) if held else alpha, fresnel=self.fresnel, masking=self.masking)
+        return {ANISOTROPY: [Option("one width in all azimuths", (ANISOTROPY,), rounded)]} | super().stand_ins()
+
     def _widths(self) -> tuple[Tensor, Tensor]:
         return self.alpha_x, self.alpha_y
 
@@ -130,7 +148,9 @@ class GGX(_Isotropic):
         masking: G_2: smith_correlated, smith_separable or v_cavities.
     Components: specular.
     Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.69 of the light at normal incidence.
-    Source: Walter et al. 2007; Heitz 2014.
+    Source: Walter, Marschner, Li & Torrance 2007, "Microfacet models for refraction through rough surfaces", DOI
+        10.2312/EGWR/EGSR07/195-206, eq. (33); Heitz 2014, "Understanding the masking-shadowing function in
+        microfacet-based BRDFs", Journal of Computer Graphics Techniques 3(2), eqs. (72), (99).
     """
 
     def distribution(self, half: HalfVector) -> Tensor:
@@ -149,6 +169,8 @@ class AnisotropicGGX(_Anisotropic):
 
     Args, components, deviations and source as `GGX`; needs a tangent.
     """
+
+    isotropic = GGX
 
     def distribution(self, half: HalfVector) -> Tensor:
         return anisotropic_ggx_distribution(half, alpha_x=self.alpha_x, alpha_y=self.alpha_y)
@@ -174,7 +196,8 @@ class Beckmann(_Isotropic):
         masking: G_2: smith_correlated, smith_separable or v_cavities.
     Components: specular.
     Deviations: single reflection: at F = 1 and alpha = 0.5 reflects 0.94 of the light at normal incidence.
-    Source: Beckmann & Spizzichino 1963; Cook & Torrance 1982; Heitz 2014.
+    Source: Beckmann & Spizzichino 1963, The Scattering of Electromagnetic Waves from Rough Surfaces; Cook & Torrance
+        1982, "A reflectance model for computer graphics", DOI 10.1145/357290.357293; Heitz 2014 (as `GGX`), eq. (99).
     """
 
     def distribution(self, half: HalfVector) -> Tensor:
@@ -193,6 +216,8 @@ class AnisotropicBeckmann(_Anisotropic):
 
     Args, components, deviations and source as `Beckmann`; needs a tangent.
     """
+
+    isotropic = Beckmann
 
     def distribution(self, half: HalfVector) -> Tensor:
         return anisotropic_beckmann_distribution(half, alpha_x=self.alpha_x, alpha_y=self.alpha_y)

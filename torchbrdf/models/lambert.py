@@ -19,7 +19,8 @@ class Lambert(LinearBRDF):
 
     Args:
         albedo: rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
-    Source: Lambert 1760; course notes eq. (35).
+    Source: Lambert 1760, Photometria; Fleet & Hertzmann 2006, "Computer Graphics Lecture Notes", University
+        of Toronto, eq. (35).
     """
 
     albedo: Constrained = Constrained(ALBEDO)

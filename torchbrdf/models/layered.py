@@ -57,7 +57,7 @@ class Mirror(_Polished):
     Args:
         fresnel: reflectance; Perfect (F = 1) if not given.
     Components: specular (0).
-    Source: course notes eqs. (37), (38).
+    Source: Fleet & Hertzmann 2006, "Computer Graphics Lecture Notes", University of Toronto, eqs. (37), (38).
     """
 
     def __init__(self, *, fresnel: Fresnel | None = None):
@@ -86,11 +86,13 @@ class Coupled(_Polished):
         albedo: rho of the body, scalar, (channel,) or (..., channel). [-] in [0, 1]; 1 reflects everything.
         fresnel: Schlick (0.04) if not given; Dielectric is exact.
     Components: matte. The mirror lobe is sampled, not evaluated: see `Mirror`.
-    Deviations: the matte part has the fitted shape of the paper. With Schlick's F the constant is
+    Deviations: the matte part has the fitted shape of Shirley et al. 1997. With Schlick's F the constant is
         21 (1 - f0)/(20 pi): the published 21/(20 pi (1 - f0)) goes with (1 - F), not with 1 - (1 - c)^5, and as
         printed reflects 1.10 of the light at f0 = 0.05. That also means that photographs show rho (1 - f0) alone: to
         fit, hold one of the two fixed.
-    Source: Shirley et al. 1997; Fundamentals of Computer Graphics, eqs. (25.1)-(25.3), corrected.
+    Source: Shirley, Smits, Hu & Lafortune 1997, "A practitioners' assessment of light reflection models", Pacific
+        Graphics; Shirley & Marschner 2009, Fundamentals of Computer Graphics, 3rd edition, eqs. (25.1)-(25.3),
+        corrected.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -117,17 +119,22 @@ class Coupled(_Polished):
 
 @final
 class Dampened(_Polished):
-    r"""A matte body seen through a smooth interface that dims it on the way out only: not reciprocal.
+    r"""A matte body that gets what a smooth interface does not reflect; nothing is lost on the way out.
 
-    .. math:: f_r = F\text{-mirror} + \frac{\rho}{\pi} (1 - F_r)
+    .. math:: f_r = F\text{-mirror} + \frac{\rho}{\pi} (1 - F_i)
+
+    F_i is that of the light: "for each incident theta" the mirror and the matte part together return F + rho (1 - F)
+    of what arrives, at most all of it. With F of the view, the other reading, they would return more than arrives at
+    grazing light.
 
     Args:
         albedo: rho of the body, scalar, (channel,) or (..., channel). [-] in [0, 1]
         fresnel: Schlick (0.04) if not given.
     Components: matte. The mirror lobe is sampled, not evaluated: see `Mirror`.
-    Deviations: not reciprocal: F is that of the view. `Coupled` is the model to use. With Schlick's F photographs show
-        rho (1 - f0) alone.
-    Source: Shirley et al., Fundamentals of Computer Graphics, ch. 25.
+    Deviations: not reciprocal, since F is that of the light alone. `Coupled` is the model to use. With Schlick's F
+        photographs show rho (1 - f0) alone.
+    Source: Shirley & Marschner 2009, Fundamentals of Computer Graphics, 3rd edition, ch. 25, smooth-layered model;
+        eq. (25.1) for what theta is.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -141,9 +148,9 @@ class Dampened(_Polished):
         return self.albedo
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
-        return {"matte": torch.atleast_1d(self.albedo) / math.pi * (1 - self.fresnel(cosines.view))}
+        return {"matte": torch.atleast_1d(self.albedo) / math.pi * (1 - self.fresnel(cosines.light))}
 
     def directional_albedo(self, cos_view: Tensor, *, nodes: int = 32) -> Tensor:
-        """F + rho (1 - F), in closed form; `nodes` is not used."""
-        mirror = self.fresnel(cos_view)
-        return mirror + torch.atleast_1d(self.albedo) * (1 - mirror)
+        """F + rho (1 - mean F), in closed form: what a view sees under uniform light, which may be more than that light
+        (not reciprocal); `nodes` is not used."""
+        return self.fresnel(cos_view) + torch.atleast_1d(self.albedo) * (1 - self.fresnel.average())

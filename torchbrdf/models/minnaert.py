@@ -24,8 +24,8 @@ def minnaert(cosines: Cosines, *, albedo: Tensor, k: Tensor) -> Tensor:
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo or k leave their domains.
     Deviations: the directional albedo is rho cos^(k-1): for k < 1 it exceeds 1 without bound towards grazing.
-    Source: Minnaert 1941; named by Oren & Nayar 1994. The planetary form I/F = B0 cos_i^k cos_r^(k-1) has
-        B0 = rho (k + 1)/2.
+    Source: Minnaert 1941, "The reciprocity principle in lunar photometry", DOI 10.1086/144279; named by Oren & Nayar
+        1994, DOI 10.1145/192161.192213. The planetary form I/F = B0 cos_i^k cos_r^(k-1) has B0 = rho (k + 1)/2.
     """
     ALBEDO.check("minnaert: albedo", albedo)
     EXPONENT.check("minnaert: k", k)

@@ -1,4 +1,4 @@
-"""Phong's highlight: the radiance of the course notes, and three BRDFs with the same lobe."""
+"""Phong's highlight: the radiance that Fleet & Hertzmann 2006 teach, and three BRDFs with the same lobe."""
 
 import math
 from typing import final
@@ -6,16 +6,26 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import safe_power
+from torchbrdf._numerics import dot, power_of_complement
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.parameters import ALBEDO, EXPONENT, Constrained, fixed
 from torchbrdf.sampling import choose, cosine_hemisphere, mirrored, power_cosine, towards
 
 
-def mirror_cosine(cosines: Cosines) -> Tensor:
-    """Cosine between the view and the mirror image of the light (...): 2 (n.l)(n.v) - l.v. [-]"""
-    return 2 * cosines.light * cosines.view - cosines.phase
+def mirror_deficit(cosines: Cosines) -> Tensor:
+    """1 less the cosine between the view v and the mirror image m of the light (...): |v - m|^2/2. [-] in [0, 2]
+
+    A large exponent multiplies its error. From the vectors it keeps all digits; from dot products alone,
+    1 + l.v - 2 (n.l)(n.v), it is known to the rounding of 1.
+    """
+    if cosines.vectors is None:
+        return (1 + cosines.phase - 2 * cosines.light * cosines.view).relu()
+    normal, light, view = cosines.vectors
+    total = light + view
+    along = total - dot(total, normal)[..., None] * normal
+    across = cosines.light - cosines.view
+    return ((dot(along, along) + across * across) / 2).masked_fill(~cosines.above_horizon, 0.0)
 
 
 def phong_radiance(
@@ -43,9 +53,10 @@ def phong_radiance(
     Returns: L (..., channel). Below the horizon of light or view the ambient part alone.
     Deviations: as printed the highlight leaks through surfaces turned away from the light; here it does not.
         0^0 = 1.
-    Source: course notes, eqs. (39), (40).
+    Source: Phong 1975, "Illumination for computer generated pictures", DOI 10.1145/360825.360839; in this form Fleet &
+        Hertzmann 2006, "Computer Graphics Lecture Notes", University of Toronto, eqs. (39), (40).
     """
-    lobe = safe_power(mirror_cosine(cosines)[..., None], torch.as_tensor(exponent)[..., None])
+    lobe = power_of_complement(mirror_deficit(cosines)[..., None], exponent[..., None])
     lit = torch.atleast_1d(diffuse) * light * cosines.light[..., None] + torch.atleast_1d(specular) * highlight * lobe
     return cosines.zero_below_horizon(lit) + torch.atleast_1d(ambient) * ambient_light
 
@@ -75,9 +86,9 @@ class _Phong(BRDF):
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         exponent = self.exponent[..., None]
-        lobe = safe_power(mirror_cosine(cosines)[..., None], exponent)
+        lobe = power_of_complement(mirror_deficit(cosines)[..., None], exponent)
         return {
-            "diffuse": (torch.atleast_1d(self.diffuse) / math.pi).expand(*lobe.shape[:-1], -1),
+            "diffuse": torch.atleast_1d(self.diffuse) / math.pi * torch.ones_like(lobe),
             "specular": torch.atleast_1d(self.specular) * self.lobe_factor(cosines, exponent) * lobe,
         }
 
@@ -91,7 +102,7 @@ class _Phong(BRDF):
         return light, torch.zeros_like(glossy)
 
     def density(self, cosines: Cosines) -> Tensor:
-        lobe = (self.exponent + 1) / (2 * math.pi) * safe_power(mirror_cosine(cosines), self.exponent)
+        lobe = (self.exponent + 1) / (2 * math.pi) * power_of_complement(mirror_deficit(cosines), self.exponent)
         return self._share() * lobe + (1 - self._share()) * cosines.light / math.pi
 
     def _share(self) -> Tensor:
@@ -110,7 +121,7 @@ class Phong(_Phong):
         exponent: n, scalar or (...). [-] >= 0
     Components: diffuse, specular.
     Deviations: not reciprocal, and unbounded at grazing light. Prefer `ModifiedPhong` or `MaxCosinePhong`.
-    Source: course notes eq. (39), divided by the irradiance.
+    Source: Phong 1975 (`phong_radiance`); Fleet & Hertzmann 2006, eq. (39), divided by the irradiance.
     """
 
     def lobe_factor(self, cosines: Cosines, exponent: Tensor) -> Tensor:
@@ -128,7 +139,8 @@ class ModifiedPhong(_Phong):
         exponent: n, scalar or (...). [-] >= 0
     Components: diffuse, specular.
     Deviations: the specular albedo is k_s at normal incidence and falls as the cosine: dark at grazing.
-    Source: Lafortune & Willems 1994.
+    Source: Lafortune & Willems 1994, "Using the modified Phong reflectance model for physically based rendering",
+        Report CW 197, KU Leuven.
     """
 
     def lobe_factor(self, cosines: Cosines, exponent: Tensor) -> Tensor:
@@ -145,7 +157,8 @@ class MaxCosinePhong(_Phong):
         diffuse, specular: k_d, k_s, scalar, (channel,) or (..., channel). [-] in [0, 1]; sum <= 1 conserves
         exponent: n, scalar or (...). [-] >= 0
     Components: diffuse, specular.
-    Source: Neumann, Neumann & Szirmay-Kalos 1999.
+    Source: Neumann, Neumann & Szirmay-Kalos 1999, "Compact metallic reflectance models", Computer Graphics Forum 18(3),
+        161-172.
     """
 
     def lobe_factor(self, cosines: Cosines, exponent: Tensor) -> Tensor:

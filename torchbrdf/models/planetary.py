@@ -44,7 +44,8 @@ def lambert_sphere_fast(cosines: Cosines, *, albedo: Tensor) -> Tensor:
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo leaves its domain.
     Deviations: a fit for rho <= 0.75: white-sky albedo 0.506 for 0.5, 0.829 for 0.8, but 1.08 for 1.
-    Source: d'Eon 2021.
+    Source: d'Eon 2021, "An analytic BRDF for materials with spherical Lambertian scatterers", Computer Graphics Forum
+        40(4), 153-161, arXiv:2103.01618.
     """
     ALBEDO.check("lambert_sphere_fast: albedo", albedo)
     rho = torch.atleast_1d(albedo)
@@ -68,7 +69,8 @@ class LommelSeeliger(LinearBRDF):
     Args:
         albedo: w, single scattering albedo, scalar, (channel,) or (..., channel). [-] in [0, 1]
     Components: direct.
-    Source: Seeliger 1887; Lommel 1889.
+    Source: Seeliger 1887, "Zur Theorie der Beleuchtung der grossen Planeten, insbesondere des Saturn"; Lommel 1889,
+        "Die Photometrie der diffusen Zurueckwerfung", Annalen der Physik 36.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -101,7 +103,8 @@ class LambertSphere(LinearBRDF):
         albedo: c, reflectance of a sphere, scalar, (channel,) or (..., channel). [-] in [0, 1]
     Components: direct.
     Deviations: multiple scattering left out; `lambert_sphere_fast` has it, fitted.
-    Source: d'Eon 2021; Schoenberg 1929.
+    Source: d'Eon 2021 (`lambert_sphere_fast`); phase function: Schoenberg 1929, "Theoretische Photometrie", DOI
+        10.1007/978-3-642-90703-6_1.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -137,7 +140,7 @@ class Hapke(BRDF):
     Components: single, multiple.
     Deviations: smooth surface; H is the two-stream approximation: at w = 1 the directional albedo is 1.04 to
         0.965. At the exact retro direction the surge has a cusp; the gradient taken there is that of the rest.
-    Source: Hapke 1981.
+    Source: Hapke 1981, "Bidirectional reflectance spectroscopy: 1. Theory", DOI 10.1029/JB086iB04p03039.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -162,12 +165,12 @@ class Hapke(BRDF):
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         w, b = torch.atleast_1d(self.albedo), self.asymmetry[..., None]
-        c = cosines.phase[..., None]
-        away = safe_sqrt(1 - c)
-        toward = safe_sqrt(1 + c)
+        away, toward = (half[..., None] for half in cosines.half_phase)
         h = self.surge_width[..., None]
         opposition = self.surge[..., None] * safe_divide(h * toward, h * toward + away, where=h * toward + away > 0)
-        phase = (1 - b * b) * safe_power(1 + 2 * b * c + b * b, torch.full_like(b, -1.5))
+        # 1 + 2 b cos(g) + b^2 as a sum of squares, which keeps its digits in the peak of a narrow lobe
+        squared = torch.where(b < 0, (1 + b) ** 2 - 4 * b * away * away, (1 - b) ** 2 + 4 * b * toward * toward)
+        phase = (1 - b * b) * safe_power(squared, torch.full_like(b, -1.5))
         absorbed = safe_sqrt(1 - w)
         h_light, h_view = (
             (1 + 2 * m) / (1 + 2 * m * absorbed) for m in (cosines.light[..., None], cosines.view[..., None])

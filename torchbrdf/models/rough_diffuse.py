@@ -1,16 +1,19 @@
 """Fujii's Oren-Nayar and its energy-preserving extension (FON and EON of Portsmouth, Kutz and Hill)."""
 
 import math
-from typing import final
+from typing import Any, final
 
 import torch
 from torch import Tensor
 
 from torchbrdf._numerics import angle_over_sine, safe_sqrt, sine
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
+from torchbrdf.effects import INTERREFLECTION, ROUGHNESS
 from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
+from torchbrdf.models.rungs import Member, lambert, stand_ins
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed, kept
 from torchbrdf.sampling import CltcSampled
 
 # 1/2 - 2/(3 pi) and 2/3 - 28/(15 pi): the mean of the retro term at grazing, and over the hemisphere.
@@ -108,7 +111,8 @@ class FujiiOrenNayar(_RoughDiffuse):
         roughness: r, scalar or (...). [-] in [0, 1]; 0 is Lambert.
     Components: direct.
     Deviations: darkens with roughness, as no light is reflected twice: white-sky albedo 0.83 rho at r = 1.
-    Source: Fujii 2012; Portsmouth, Kutz & Hill 2025.
+    Source: Fujii 2013, "A tiny improvement of Oren-Nayar reflectance model", at
+        mimosa-pudica.net/improved-oren-nayar.html; Portsmouth, Kutz & Hill 2025 (as `EON`).
     """
 
     def __init__(self, *, albedo: Tensor | float | fixed = 0.5, roughness: Tensor | float | fixed = 0.5):
@@ -127,6 +131,13 @@ class FujiiOrenNayar(_RoughDiffuse):
         """rho (1 + r G/pi)/(1 + c1 r), in closed form; `nodes` is not used."""
         return torch.atleast_1d(self.albedo) * fon_albedo(cos_view[..., None], roughness=self.roughness[..., None])
 
+    def members(self) -> list[Member]:
+        """The ladder up to this model."""
+        return [lambert(self), Member("Fujii", (ROUGHNESS,), self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())
+
 
 @final
 class EON(_RoughDiffuse):
@@ -143,7 +154,8 @@ class EON(_RoughDiffuse):
         roughness: r, scalar or (...). [-] in [0, 1]; 0 is Lambert.
         exact: False takes the quartic for G, as renderers do; the furnace is then 0.9998 to 1.
     Components: direct, interreflection.
-    Source: Portsmouth, Kutz & Hill 2025, EON: A practical energy-preserving rough diffuse BRDF.
+    Source: Portsmouth, Kutz & Hill 2025, "EON: A practical energy-preserving rough diffuse BRDF", Journal of Computer
+        Graphics Techniques 14(1), arXiv:2410.18026.
     """
 
     def __init__(
@@ -200,3 +212,11 @@ class EON(_RoughDiffuse):
     def _returned(self) -> Tensor:
         rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness[..., None])
         return rho * rho * average / (1 - rho * (1 - average))
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model."""
+        material: dict[str, Any] = {name: kept(self, name) for name in ("albedo", "roughness")}
+        return [*FujiiOrenNayar(**material).members(), Member("EON", (ROUGHNESS, INTERREFLECTION), self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())

@@ -6,7 +6,7 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import angle, dot, safe_divide, safe_sqrt
+from torchbrdf._numerics import angle, cross, dot, length, safe_atan2, safe_divide, safe_sqrt
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.facets import HalfVector
@@ -20,19 +20,31 @@ def rusinkiewicz_angles(cosines: Cosines) -> tuple[Tensor, Tensor, Tensor]:
     :math:`|\cos\phi_d| = |\cos\theta_r - \cos\theta_i| / (2 \sin\theta_h \sin\theta_d)`.
     Zero gradient where an angle has none: phi_d at theta_h = 0 and theta_d = 0, taken as 0 there.
     """
+    if cosines.vectors is not None:
+        return _angles_of_vectors(cosines, *cosines.vectors)
     half = HalfVector.of(cosines)
     sin_h = safe_sqrt(half.sine_squared)
-    if cosines.vectors is None:
-        sin_d = safe_sqrt((1 - cosines.phase) / 2)
-    else:  # keeps its digits near the retro direction
-        apart = cosines.vectors[1] - cosines.vectors[2]
-        sin_d = safe_sqrt(dot(apart, apart).masked_fill(~cosines.above_horizon, 0.0)) / 2
+    sin_d = safe_sqrt((1 - cosines.phase) / 2)
     product = 2 * sin_h * sin_d
     defined = product > 0
     cos_phi = safe_divide((cosines.view - cosines.light).abs(), product, where=defined).clamp(max=1.0)
     cos_phi = torch.where(defined, cos_phi, torch.ones_like(cos_phi))
     sin_phi = safe_sqrt((1 - cos_phi) * (1 + cos_phi))
     return angle(sin_h, half.cos), angle(sin_d, half.cos_light), angle(sin_phi, cos_phi)
+
+
+def _angles_of_vectors(cosines: Cosines, normal: Tensor, light: Tensor, view: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """The same from the vectors: all digits, and phi_d from the very numbers that theta_h and theta_d are made of.
+
+    Beside the mirror and the retro direction its derivative is without bound and meets a difference of the table that
+    vanishes: they have to agree on how far away that is.
+    """
+    below = ~cosines.above_horizon
+    total, apart = light + view, (light - view).masked_fill(below[..., None], 0.0)
+    across = cross(normal, total).masked_fill(below[..., None], 0.0)  # as long as |l + v| sin(theta_h)
+    size = length(total).masked_fill(below, 1.0)
+    phi = safe_atan2(dot(apart, across).abs(), dot(apart, cross(total, across)).abs() / size)
+    return safe_atan2(length(across), cosines.light + cosines.view), safe_atan2(length(apart), size), phi
 
 
 @final
@@ -50,8 +62,12 @@ class TabulatedBRDF(BRDF):
     Raises: TypeError for a dtype that is not supported; ValueError for another shape, or values that are negative
         or not finite.
     Deviations: what the table holds. Light and view may be exchanged, and the two sides of the plane of incidence
-        are one; below the horizon 0 whatever the table says. Values are measured, not trained: a buffer.
-    Source: Rusinkiewicz 1998; Matusik et al. 2003.
+        are one; below the horizon 0 whatever the table says. A table whose rows theta_h = 0 or theta_d = 0 depend on
+        phi_d, which has no meaning there, jumps in the mirror or the retro direction. Values are
+        measured, not trained: a buffer.
+    Source: Rusinkiewicz 1998, "A new change of variables for efficient BRDF representation", DOI
+        10.1007/978-3-7091-6453-2_2; Matusik, Pfister, Brand & McMillan 2003, "A data-driven reflectance model", DOI
+        10.1145/882262.882343.
     """
 
     uniform_share = 0.25
@@ -98,23 +114,29 @@ class TabulatedBRDF(BRDF):
         light = torch.stack((td.sin() * pd.cos(), td.sin() * pd.sin(), td.cos()), -1)
         view = light * light.new_tensor([-1.0, -1.0, 1.0])
         with torch.no_grad():
-            return cls(brdf(normal, light, view).relu(), half_power=half_power)
+            values = brdf(normal, light, view).relu()
+            values[0], values[:, 0] = values[0, :, :1], values[:, 0, :1]  # phi_d has no meaning there
+            return cls(values, half_power=half_power)
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
-        axes = zip(rusinkiewicz_angles(cosines), self.values.shape, (self.half_power, 1.0, 1.0), strict=False)
-        brackets = [_bracket(a, n, p) for a, n, p in axes]
-        total: Tensor | float = 0.0
-        for corner in range(8):
-            sides = [(corner >> k) & 1 for k in range(3)]
-            weight = 1.0
-            for (_, share), side in zip(brackets, sides, strict=True):
-                weight = weight * (share if side else 1 - share)
-            index = [
-                (low + side).clamp(max=n - 1)
-                for (low, _), side, n in zip(brackets, sides, self.values.shape, strict=False)
-            ]
-            total = total + torch.as_tensor(weight)[..., None] * self.values[index[0], index[1], index[2]]
-        return {"measured": torch.as_tensor(total)}
+        theta_h, theta_d, phi_d = rusinkiewicz_angles(cosines)
+        nodes = self.values.shape
+        half, half_share = _bracket(theta_h, nodes[0], self.half_power)
+        difference, difference_share = _bracket(theta_d, nodes[1], 1.0)
+        azimuth, azimuth_share = _bracket(phi_d, nodes[2], 1.0)
+        beside = (azimuth + 1).clamp(max=nodes[2] - 1)
+
+        def row(i: Tensor, j: Tensor) -> Tensor:
+            # phi_d first, as a difference: exactly none in rows where phi_d has no meaning and an endless derivative
+            start, end = self.values[i, j, azimuth], self.values[i, j, beside]
+            return start + azimuth_share[..., None] * (end - start)
+
+        low, high = (
+            row(i, difference) * (1 - difference_share)[..., None]
+            + row(i, difference + 1) * difference_share[..., None]
+            for i in (half, half + 1)
+        )
+        return {"measured": low * (1 - half_share)[..., None] + high * half_share[..., None]}
 
 
 def _bracket(value: Tensor, nodes: int, power: float) -> tuple[Tensor, Tensor]:

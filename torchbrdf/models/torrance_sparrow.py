@@ -5,8 +5,9 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import BRDF
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import Cosines
+from torchbrdf.effects import FRESNEL_VARIATION
 from torchbrdf.facets import (
     HalfVector,
     slope_area,
@@ -17,7 +18,7 @@ from torchbrdf.facets import (
     visible_azimuth,
 )
 from torchbrdf.fresnel import Fresnel, Perfect
-from torchbrdf.parameters import ROUGHNESS, Constrained, fixed
+from torchbrdf.parameters import ROUGHNESS, Constrained, fixed, kept
 from torchbrdf.sampling import along_view, mirrored
 
 
@@ -37,12 +38,16 @@ def torrance_sparrow(
         cosines: of light, view and phase angle, each (...).
         sigma: roughness, scalar or (...). [rad] in (0, pi/2]
         fresnel: F at the half vector (..., channel). [-]
-        normalised: False leaves out c/4, as (31) does, for k_s values of the paper: then k_s has the unit 1/sr.
+        normalised: False leaves out c/4, as Oren & Nayar 1994, eq. (31), for k_s values of that paper: k_s is then in
+            1/sr.
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when sigma leaves its domain.
     Deviations: grows as 1/cos^2 towards grazing in the mirror direction, while the directional albedo stays
         <= 1; single reflection only.
-    Source: Torrance & Sparrow 1967; Oren & Nayar 1994, eqs. (31)-(33), with Min for the misprinted Max.
+    Source: Torrance & Sparrow 1967, "Theory for off-specular reflection from roughened surfaces", DOI
+        10.1364/JOSA.57.001105; Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI
+        10.1145/192161.192213, long version (1995, DOI 10.1007/BF01679684), eqs. (31)-(33), (38), with Min for the
+        misprinted Max.
     """
     ROUGHNESS.check("torrance_sparrow: sigma", sigma)
     half = HalfVector.of(cosines)
@@ -53,7 +58,8 @@ def _lobe(cosines: Cosines, half: HalfVector, sigma: Tensor, normalised: bool) -
     spread = slope_area(half, sigma=sigma) / 4
     if not normalised:
         spread = 4 * (spread * slope_area_norm(sigma))
-    return v_cavity_masking(cosines, half) * spread / (cosines.light * cosines.view * half.cos)
+    lobe = v_cavity_masking(cosines, half) * spread / (cosines.light * cosines.view * half.cos)
+    return lobe.to(torch.promote_types(lobe.dtype, sigma.dtype))  # a number alone would not widen it
 
 
 @final
@@ -63,11 +69,11 @@ class TorranceSparrow(BRDF):
     Args:
         sigma: roughness, scalar or (...). [rad]
         fresnel: reflectance of a facet; Perfect (F = 1) if not given.
-        normalised: False leaves out c/4, as (31) of Oren & Nayar does.
+        normalised: False leaves out c/4, as Oren & Nayar 1994, eq. (31).
     Components: specular.
     Raises: ValueError outside the domain.
 
-    The body and surface mixture (32) of Oren & Nayar is `k_b * OrenNayar(...) + k_s * TorranceSparrow(...)`.
+    The body and surface mixture of Oren & Nayar 1994, eq. (32), is `k_b * OrenNayar(...) + k_s * TorranceSparrow(...)`.
     """
 
     sigma: Constrained = Constrained(ROUGHNESS)
@@ -97,3 +103,11 @@ class TorranceSparrow(BRDF):
         half = HalfVector.of(cosines)
         seen = (half.cos_light / (cosines.view * half.cos)).clamp(max=2.0)
         return slope_area(half, sigma=self.sigma) * seen / (4 * half.cos_light)
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        """The same facets with one reflectance at every angle."""
+        flat = self.fresnel.at_every_angle()
+        if flat is None:
+            return {}
+        stand_in = TorranceSparrow(sigma=kept(self, "sigma"), fresnel=flat, normalised=self.normalised)
+        return {FRESNEL_VARIATION: [Option("the reflectance of normal incidence", (FRESNEL_VARIATION,), stand_in)]}

@@ -1,7 +1,7 @@
 """The clipped, linearly transformed cosine of EON: the sampler of rough diffuse models.
 
-Source: Portsmouth, Kutz & Hill, "EON: A practical energy-preserving rough diffuse BRDF", Journal of Computer Graphics
-Techniques 14(1), 2025.
+Source: Portsmouth, Kutz & Hill 2025, "EON: A practical energy-preserving rough diffuse BRDF", Journal of Computer
+    Graphics Techniques 14(1), arXiv:2410.18026.
 """
 
 import math
@@ -67,8 +67,9 @@ def cltc_density(cosines: Cosines, roughness: Tensor) -> Tensor:
 
 
 def equivalent_roughness(sigma: Tensor) -> Tensor:
-    """Roughness r of EON (...) whose sampler fits an Oren-Nayar surface of sigma (...) [rad]: B/A of (30), below 0.9.
+    """Roughness r of EON (...) whose sampler fits an Oren-Nayar surface of sigma (...) [rad]: B/A, below 0.9.
 
+    A and B are those of Oren & Nayar 1994, DOI 10.1145/192161.192213, eq. (30).
     Variance relative to the squared mean stays below 0.05 for sigma from 0.2 to 1, at any view. The rms slope angle
     of other distributions serves as well as sigma.
     """

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf._numerics import cross, safe_divide
-from torchbrdf.directions import Cosines, any_tangent, orthonormal_tangent
+from torchbrdf.directions import Cosines
 from torchbrdf.sampling.draws import Sample, choose, cosine_hemisphere, uniform_hemisphere
 
 
@@ -17,16 +17,15 @@ class Sampled:
     Models override `propose` with `density` to draw from something nearer to what they reflect.
     """
 
-    anisotropic: bool = False
     uniform_share: float = 0.0
 
     def evaluate(self, cosines: Cosines) -> Tensor:
         """f_r (..., channel) [1/sr], of the model."""
         raise NotImplementedError
 
-    def missing_tangent(self) -> str:
-        """What an anisotropic model says to whom gives no tangent."""
-        return f"{type(self).__name__} is anisotropic and needs a tangent: pass tangent=... (..., 3)."
+    def tangent_of(self, normal: Tensor, tangent: Tensor | None) -> Tensor:
+        """Unit tangent (..., 3) of the frame in which `propose` works, of the model."""
+        raise NotImplementedError
 
     def sample(self, normal: Tensor, view: Tensor, u: Tensor, *, tangent: Tensor | None = None) -> Sample:
         """Light directions drawn for unit normals and views (..., 3) from u (..., 2) uniform in [0, 1).
@@ -35,11 +34,12 @@ class Sampled:
         `Cosines.of` raises.
         """
         with torch.no_grad():
-            t = self._frame(normal, view, tangent)
+            t = self.tangent_of(normal, tangent)
+            t = t.expand(torch.broadcast_shapes(t.shape, view.shape))
             axes = torch.stack((t, cross(normal, t), normal.expand_as(t)), -1)
             local = (axes * view[..., :, None]).sum(-2)
             proposed, delta = self.propose(local, u)
-            light = (axes * proposed[..., None, :]).sum(-1)
+            light = (axes * proposed.to(axes.dtype)[..., None, :]).sum(-1)
             light = light / light.norm(dim=-1, keepdim=True)
         cosines = Cosines.of(normal, light, view, tangent=t)
         with torch.no_grad():
@@ -58,7 +58,7 @@ class Sampled:
     def pdf(self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None) -> Tensor:
         """Density [1/sr] (...) with which `sample` draws the light; 0 below the horizon, delta lobes left out."""
         with torch.no_grad():
-            cosines = Cosines.of(normal, light, view, tangent=self._frame(normal, view, tangent))
+            cosines = Cosines.of(normal, light, view, tangent=self.tangent_of(normal, tangent))
             return self.density(cosines).masked_fill(~cosines.above_horizon, 0.0)
 
     def propose(self, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:
@@ -81,15 +81,6 @@ class Sampled:
     def delta_probability(self, cosines: Cosines) -> Tensor:
         """Probability (...) with which `propose` returns the mirror direction."""
         return torch.zeros_like(cosines.view)
-
-    def _frame(self, normal: Tensor, view: Tensor, tangent: Tensor | None) -> Tensor:
-        if tangent is not None:
-            t = orthonormal_tangent(normal, tangent)
-        elif self.anisotropic:
-            raise ValueError(self.missing_tangent())
-        else:
-            t = any_tangent(normal)
-        return t.expand(torch.broadcast_shapes(t.shape, view.shape))
 
 
 def propose_from_parts(parts: Sequence[Sampled], shares: Tensor, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:

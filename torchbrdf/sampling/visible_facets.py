@@ -18,7 +18,7 @@ def visible_ggx_facet(view: Tensor, alpha_x: Tensor, alpha_y: Tensor, u: Tensor)
 
     Args:
         view: local (..., 3), above the horizon. alpha_x, alpha_y: (...). u: (..., 2).
-    Source: Dupuy & Benyoub 2023 (spherical caps).
+    Source: Dupuy & Benyoub 2023, "Sampling visible GGX normals with spherical caps", DOI 10.1111/cgf.14867.
     """
     stretched = _stretched(view, alpha_x, alpha_y)
     x, y, z = stretched.unbind(-1)
@@ -34,7 +34,8 @@ def visible_beckmann_facet(view: Tensor, alpha_x: Tensor, alpha_y: Tensor, u: Te
 
     The slope along the stretched view has density (1 + slope tan)^+ exp(-slope^2); its integral is closed and is
     inverted by bisection. Across it the slope is Gaussian. Arguments as `visible_ggx_facet`.
-    Source: Heitz & d'Eon 2014; Jakob 2014.
+    Source: Heitz & d'Eon 2014, "Importance sampling microfacet-based BSDFs using the distribution of visible normals",
+        DOI 10.1111/cgf.12417; Jakob 2014, "An improved visible normal sampling routine for the Beckmann distribution".
     """
     stretched = _stretched(view, alpha_x, alpha_y)
     # facet normals proportional to (-p, -q, 1) with slopes p along the view's azimuth

@@ -16,17 +16,27 @@ from torchbrdf.testing.laws import (
     hard_directions,
     magnitude,
     random_directions,
+    value_and_gradients,
+)
+from torchbrdf.testing.quadrature import (
+    albedo_by_quadrature,
+    panels,
 )
 from torchbrdf.testing.sampling import (
+    AZIMUTH,
+    SamplingSetup,
     assert_density_integrates,
     assert_samples_follow_pdf,
     assert_weights,
 )
 
 __all__ = [
+    "AZIMUTH",
     "TOLERANCE",
     "Directions",
+    "SamplingSetup",
     "Tolerance",
+    "albedo_by_quadrature",
     "assert_broadcasts_like_a_loop",
     "assert_density_integrates",
     "assert_energy",
@@ -41,5 +51,7 @@ __all__ = [
     "assert_zero_below_horizon",
     "hard_directions",
     "magnitude",
+    "panels",
     "random_directions",
+    "value_and_gradients",
 ]

@@ -15,11 +15,9 @@ import copy
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import NamedTuple
 
 import torch
-from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 from torch.autograd.gradcheck import GradcheckError
 from torch.func import functional_call
@@ -28,6 +26,7 @@ from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.mixture import WeightedSum
+from torchbrdf.testing.quadrature import albedo_by_quadrature
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ def assert_zero_below_horizon(brdf: BRDF, normal: Tensor, light: Tensor, view: T
     """f_r and its gradient are exactly 0 once light, view or both are mirrored below the surface."""
     down_light, down_view = (v - 2 * (normal * v).sum(-1, keepdim=True) * normal for v in (light, view))
     for what, s, v in (("light", down_light, view), ("view", light, down_view), ("both", down_light, down_view)):
-        f, gradients = _value_and_gradients(brdf, Directions(normal, s, v))
+        f, gradients = value_and_gradients(brdf, Directions(normal, s, v))
         for name, value in {"value": f, **gradients}.items():
             if not bool((value == 0).all()):
                 raise AssertionError(f"{what} below the horizon: {name} is not 0 (largest {value.abs().max():.3g})")
@@ -166,7 +165,7 @@ def assert_energy(
     """
     exact = copy.deepcopy(brdf).double()
     for angle in view_angles:
-        coarse, fine = (_directional_albedo(exact, angle, n) for n in (nodes, 2 * nodes))
+        coarse, fine = (albedo_by_quadrature(exact, angle, n) for n in (nodes, 2 * nodes))
         _assert_close(f"quadrature at {angle:g} rad not converged, more nodes", coarse, fine, tolerance * limit)
         if not bool((fine <= limit + tolerance).all()):
             raise AssertionError(f"reflects {fine.max():.6f} of the light from {angle:g} rad; limit {limit:g}")
@@ -174,7 +173,7 @@ def assert_energy(
 
 def assert_finite(brdf: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> None:
     """f_r and its gradients with respect to directions and parameters are finite."""
-    f, gradients = _value_and_gradients(brdf, Directions(normal, light, view))
+    f, gradients = value_and_gradients(brdf, Directions(normal, light, view))
     for name, value in {"value": f, **gradients}.items():
         if not bool(value.isfinite().all()):
             raise AssertionError(f"{name} is not finite: {int((~value.isfinite()).sum())} of {value.numel()} entries")
@@ -182,7 +181,7 @@ def assert_finite(brdf: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> No
 
 def assert_keeps_dtype(brdf: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> None:
     """A model and directions in one dtype give values, components and gradients in that dtype."""
-    f, gradients = _value_and_gradients(brdf, Directions(normal, light, view))
+    f, gradients = value_and_gradients(brdf, Directions(normal, light, view))
     for name, value in {"value": f, **gradients, **brdf.components(normal, light, view)}.items():
         if value.dtype != normal.dtype:
             raise AssertionError(f"{name} is {value.dtype} although directions are {normal.dtype}")
@@ -232,7 +231,7 @@ def assert_gradients(brdf: BRDF, normal: Tensor, light: Tensor, view: Tensor, *,
         raise AssertionError(f"a derivative is wrong: {error}") from None
 
 
-def _value_and_gradients(brdf: BRDF, directions: Directions) -> tuple[Tensor, dict[str, Tensor]]:
+def value_and_gradients(brdf: BRDF, directions: Directions) -> tuple[Tensor, dict[str, Tensor]]:
     given = {name: v.detach().clone().requires_grad_() for name, v in directions._asdict().items()}
     inputs = given | {name: p for name, p in brdf.named_parameters() if p.requires_grad}
     f = brdf(**given)
@@ -250,25 +249,6 @@ def _magnitude(brdf: BRDF, cosines: Cosines) -> Tensor:
         return torch.stack(torch.broadcast_tensors(*scaled)).sum(0)
     parts = [cosines.zero_below_horizon(part).abs() for part in brdf.evaluate_components(cosines).values()]
     return torch.stack(torch.broadcast_tensors(*parts)).sum(0)
-
-
-def _directional_albedo(brdf: BRDF, view_angle: float, nodes: int) -> Tensor:
-    """Share of light from view_angle [rad] that is reflected (channel,); through `forward` alone."""
-    theta, theta_weight = _panels([0.0, view_angle, math.pi / 2], nodes)
-    phi, phi_weight = _panels([k * math.pi / 2 for k in range(5)], nodes)
-    sin, cos = theta.sin()[:, None], theta.cos()[:, None]
-    light = torch.stack(torch.broadcast_tensors(sin * phi.cos(), sin * phi.sin(), cos), -1)
-    view = torch.tensor([math.sin(view_angle), 0.0, math.cos(view_angle)], dtype=torch.float64)
-    normal = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64)
-    with torch.no_grad():
-        f = brdf(normal, light, view, normalize=True)
-    return (f * (sin * cos * theta_weight[:, None] * phi_weight)[..., None]).sum((0, 1))
-
-
-def _panels(ends: list[float], nodes: int) -> tuple[Tensor, Tensor]:
-    x, w = (torch.from_numpy(a) for a in leggauss(nodes))
-    points = torch.cat([a + (b - a) * (1 + x) / 2 for a, b in pairwise(ends)])
-    return points, torch.cat([(b - a) / 2 * w for a, b in pairwise(ends)])
 
 
 def _polar(theta_degrees: float, phi_degrees: float) -> Tensor:

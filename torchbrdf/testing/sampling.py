@@ -20,33 +20,38 @@ from torch import Tensor
 from torchbrdf.brdf import BRDF
 from torchbrdf.sampling import Sample
 
-_AZIMUTH = 0.3
+# Azimuth of every view, from the tangent. [rad]
+AZIMUTH = 0.3
 _FEWEST = 10.0
 
 
 @dataclass(frozen=True)
-class _Setting:
+class SamplingSetup:
+    """A float64 copy of a model, the axes (tangent, bitangent, normal) of a tilted surface, and a view of it."""
+
     brdf: BRDF
     axes: Tensor
     view: Tensor
 
     @classmethod
-    def of(cls, brdf: BRDF, view_angle: float) -> "_Setting":
+    def of(cls, brdf: BRDF, view_angle: float) -> "SamplingSetup":
         normal = torch.nn.functional.normalize(torch.tensor([0.3, -0.5, 0.8], dtype=torch.float64), dim=0)
         grain = getattr(brdf, "direction", torch.tensor([1.0, 0.0, 0.2])).double()
         tangent = torch.nn.functional.normalize(grain - (grain @ normal) * normal, dim=0)
         axes = torch.stack((tangent, torch.linalg.cross(normal, tangent), normal))
         s, c = math.sin(view_angle), math.cos(view_angle)
-        local = torch.tensor([s * math.cos(_AZIMUTH), s * math.sin(_AZIMUTH), c], dtype=torch.float64)
+        local = torch.tensor([s * math.cos(AZIMUTH), s * math.sin(AZIMUTH), c], dtype=torch.float64)
         view = torch.nn.functional.normalize(local @ axes, dim=0)
         return cls(copy.deepcopy(brdf).double(), axes, view)
 
     def draw(self, n: int, generator: torch.Generator) -> Sample:
+        """Light directions (n, 3) of one view, as `BRDF.sample` draws them."""
         u = torch.rand(n, 2, dtype=torch.float64, generator=generator)
         normal, view = self.axes[2].expand(n, 3), self.view.expand(n, 3)
         return self.brdf.sample(normal, view, u)
 
     def pdf(self, light: Tensor) -> Tensor:
+        """`BRDF.pdf` of directions (..., 3) for the view. [1/sr]"""
         return self.brdf.pdf(self.axes[2].expand_as(light), light, self.view.expand_as(light))
 
     def probabilities(self, rings: int, sectors: int, nodes: int) -> Tensor:
@@ -72,7 +77,7 @@ def assert_density_integrates(
 
     False-alarm rate below 1e-6: five standard deviations of the counted share. 1e-4 allows for the quadrature.
     """
-    setting = _Setting.of(brdf, view_angle)
+    setting = SamplingSetup.of(brdf, view_angle)
     total = float(setting.probabilities(24, 24, nodes).sum())
     pdf = setting.draw(draws, generator).pdf
     missed = float(((pdf == 0) | pdf.isinf()).double().mean())
@@ -95,7 +100,7 @@ def assert_samples_follow_pdf(
     `false_alarm` is the probability that a correct sampler fails one such test: divide what you accept by the
     number of tests (Bonferroni). Bins with fewer than 10 expected draws are put together.
     """
-    setting = _Setting.of(brdf, view_angle)
+    setting = SamplingSetup.of(brdf, view_angle)
     rings, sectors = 16, 24
     expected = draws * setting.probabilities(rings, sectors, nodes).flatten()
     sample = setting.draw(draws, generator)
@@ -123,7 +128,7 @@ def assert_samples_follow_pdf(
 
 def assert_weights(brdf: BRDF, view_angle: float, *, draws: int = 1000, generator: torch.Generator) -> Sample:
     """Weight = f_r cos(light)/pdf and pdf = `pdf(...)` for each draw, 0 for the rejected; returns the draws."""
-    setting = _Setting.of(brdf, view_angle)
+    setting = SamplingSetup.of(brdf, view_angle)
     sample = setting.draw(draws, generator)
     normal, view = setting.axes[2].expand(draws, 3), setting.view.expand(draws, 3)
     smooth = sample.pdf.isfinite()

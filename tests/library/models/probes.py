@@ -5,7 +5,7 @@ import math
 import torch
 
 from torchbrdf import fixed
-from torchbrdf import testing as laws
+from torchbrdf.testing import laws
 
 COS = [0.05, 0.3, 0.8, 1.0]
 
@@ -21,7 +21,7 @@ def held(x):
 def albedo(brdf, cos, nodes=48):
     """By quadrature through `forward`, channel 0."""
     with torch.no_grad():
-        return float(laws._directional_albedo(brdf, math.acos(cos), nodes)[0])
+        return float(laws.albedo_by_quadrature(brdf, math.acos(cos), nodes)[0])
 
 
 def few(n=200, max_angle=85.0):

@@ -151,9 +151,10 @@ def close(got, expected, **kwargs):
 def test_model(name, row):
     brdf = MAKE[name](row["params"])
     tangent = TANGENT if brdf.anisotropic else None
-    got = brdf(NORMAL, LIGHT, VIEW, tangent=tangent, normalize=True)[:, 0]
-    # The opposition surge has a cusp: at retro tan(g/2) is the root of what rounding left of 1 - cos(g), over h = 0.05.
-    close(got, row["values"], rtol=1e-6 if name == "hapke" and "hs" in row["params"] else RTOL)
+    # The numbers of the dampened model take F of the view; ours is that of the light (see `Dampened`).
+    light, view = (VIEW, LIGHT) if name == "shirley_dampened_matte" else (LIGHT, VIEW)
+    got = brdf(NORMAL, light, view, tangent=tangent, normalize=True)[:, 0]
+    close(got, row["values"])
 
 
 @pytest.mark.parametrize(("name", "row"), [r for r in ROWS if r[0] in PARTS], ids=identify)

@@ -95,8 +95,23 @@ def test_mirror_and_dampened():
     assert (Mirror()(*few()) == 0).all()
     assert_close(Mirror(fresnel=Schlick(f0=held(0.3))).directional_albedo(doubles([1.0])), doubles([[0.3]]))
     brdf = Dampened(albedo=held(0.8), fresnel=Dielectric(eta=held(1.5)))
-    for c in COS:
-        assert albedo(brdf, c) == pytest.approx(0.8 * (1 - float(brdf.fresnel(doubles(c)))), rel=1e-9)
+    mean = quad(lambda c: 2 * c * float(brdf.fresnel(doubles(c))), 0, 1)[0]
+    for c in COS:  # of uniform light, into one direction
+        assert albedo(brdf, c) == pytest.approx(0.8 * (1 - mean), rel=1e-5)
+
+
+@pytest.mark.parametrize("cos_light", COS)
+def test_dampened_returns_what_its_interface_lets_through(cos_light):
+    # "For each incident theta", (25.1): light from one direction, summed over all views; above 1 with F of the view.
+    brdf = Dampened(albedo=held(1.0), fresnel=Dielectric(eta=held(1.5)))
+    light = doubles([math.sqrt(1 - cos_light**2), 0.0, cos_light])
+
+    def leaving(cos_view):
+        view = doubles([0.0, math.sqrt(1 - cos_view**2), cos_view])
+        return 2 * math.pi * cos_view * float(brdf(doubles([0.0, 0.0, 1.0]), light, view, normalize=True))
+
+    matte = quad(leaving, 0, 1)[0]
+    assert matte + float(brdf.fresnel(doubles(cos_light))) == pytest.approx(1.0, abs=1e-9)
 
 
 def grained(**material):

@@ -1,10 +1,10 @@
-r"""Light that the diffracted lobe returns in all directions, by quadrature that resolves it.
+r"""Light that the directional-diffuse part returns in all directions, by quadrature that resolves it.
 
-In the plane of l_xy, cos dw = dx dy, and the lobe is a function of the distance p from the mirror point -v_xy and of
+In the plane of l_xy, cos dw = dx dy, and that part is a function of the distance p from the mirror point -v_xy and of
 the polar cosine. Its width in p is that of exp(-t/max(1, g)), which can be far below 1. Around the mirror point, each
-ray runs to the rim of the unit disc along p = p0 sinh(a w), w = x(2 - x), with p0 that width: nodes are dense in the
-lobe, logarithmic in its tail, and the root at the rim, where the light grazes, becomes smooth. Rays crowd about the
-direction across the plane of incidence, where at grazing the rim turns away within an angle of cos(theta).
+ray runs to the rim of the unit disc along p = p0 sinh(a w), w = x(2 - x), with p0 that width: nodes are dense where it
+is bright, logarithmic in its tail, and the root at the rim, where the light grazes, becomes smooth. Rays crowd about
+the direction across the plane of incidence, where at grazing the rim turns away within an angle of cos(theta).
 """
 
 import math
@@ -15,10 +15,14 @@ from torch import Tensor
 
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.fresnel import conductor
-from torchbrdf.models.he_torrance.lobe import Geometry, diffracted
+from torchbrdf.models.he_torrance.perfect_reflector import (
+    Geometry,
+    directional_diffuse_of_facets,
+    directional_diffuse_of_waves,
+)
 from torchbrdf.quadrature import gauss_legendre
 
-# As many radial nodes as azimuths on each side of the plane across; see `lobe_albedo` for the errors.
+# As many radial nodes as azimuths on each side of the plane across; see `directional_diffuse_albedo` for the errors.
 NODES = 32
 
 
@@ -29,7 +33,7 @@ class _Ray(NamedTuple):
     weight: Tensor
 
 
-def lobe_albedo(
+def directional_diffuse_albedo(
     cos_view: Tensor,
     *,
     sigma0: Tensor,
@@ -38,10 +42,12 @@ def lobe_albedo(
     eta: Tensor,
     k: Tensor,
     nodes: int = NODES,
+    wave_optics: bool = True,
 ) -> Tensor:
-    """Share of light from `cos_view` (...) in (0, 1] that the diffracted lobe returns (..., channel). [-]
+    """Share of light from `cos_view` (...) in (0, 1] that the directional-diffuse part returns (..., channel). [-]
 
-    `nodes` radii times 2 `nodes` azimuths. sigma0, tau scalar or (...); wavelength, eta, k as `he_torrance`.
+    `nodes` radii times 2 `nodes` azimuths. sigma0, tau scalar or (...); wavelength, eta, k as `he_torrance`. Without
+    `wave_optics` it is that of facets.
     """
     c = cos_view[..., None]
     s = safe_sqrt((1 - c) * (1 + c))
@@ -54,7 +60,7 @@ def lobe_albedo(
     along = s * ray.cos
     root = (c * c + along * along).sqrt()
     reach = torch.where(along > 0, c * c / (along.abs() + root), along.abs() + root)
-    width = _width(c, sigma0, tau, wavelength)
+    width = _width(c, sigma0, tau, wavelength) if wave_optics else 4 * sigma0 * c / tau
     a = torch.asinh(reach / width)
     w = x * (2 - x)
     p = width * torch.sinh(a * w)
@@ -66,7 +72,8 @@ def lobe_albedo(
     sin_light = safe_sqrt(s * s + 2 * along * p + planar)
     geometry = Geometry(cos_light, sin_light, c, s, planar, planar + up * up)
     fresnel = conductor(geometry.local_cos, eta=torch.atleast_1d(eta), k=torch.atleast_1d(k))
-    f = fresnel * diffracted(geometry, sigma0=sigma0, tau=tau, wavelength=wavelength)
+    reflectance = directional_diffuse_of_waves if wave_optics else directional_diffuse_of_facets
+    f = fresnel * reflectance(geometry, sigma0=sigma0, tau=tau, wavelength=wavelength)
     area = p * (width * torch.cosh(a * w) * a * 2 * (1 - x))
     return (f * (area * weight * ray.weight)).sum((0, 1))
 
@@ -84,6 +91,6 @@ def _rays(c: Tensor, nodes: int) -> _Ray:
 
 
 def _width(c: Tensor, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
-    """Radius (..., channel) in the plane of l_xy at which the lobe has fallen to about 1/e, seen from the cosine c."""
+    """Radius (..., channel) in the plane of l_xy at which the part has fallen to about 1/e, seen from the cosine c."""
     phase = 4 * math.pi / wavelength * sigma0 * c
     return wavelength / (math.pi * tau) * (1 + phase * phase).sqrt()

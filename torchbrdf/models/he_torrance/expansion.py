@@ -47,7 +47,7 @@ def expansion(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, degree: in
     v, y = 1 / (1 + w), 1 / m
     exponent = -t / m - m * (torch.expm1(-w / 2) + w / 2)
     scale = exp_or_zero(exponent) * y * v.sqrt() / g
-    found = []
+    means = []
     for n, q in orders:
         P = [_evaluate(_polynomials(degree, i, q), v, y) for i in range(n + 1)]
         value = scale * P[0]
@@ -56,8 +56,8 @@ def expansion(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, degree: in
             value = scale / g * (e * P[0] + P[1])
             if n > 1:
                 value = scale / g**2 * ((e**2 - m * w * v) * P[0] + (2 * e - 1) * P[1] + P[2])
-        found.append(value)
-    return found
+        means.append(value)
+    return means
 
 
 def exp_or_zero(x: Tensor) -> Tensor:
@@ -68,12 +68,12 @@ def exp_or_zero(x: Tensor) -> Tensor:
 @functools.cache
 def coefficients(degree: int) -> tuple[Polynomial, ...]:
     """a_0 = 1 to a_degree as polynomials in v."""
-    found = [Polynomial([1.0])]
+    polynomials = [Polynomial([1.0])]
     for k in range(degree):
-        b = _lowered(found[k], k)
+        b = _lowered(polynomials[k], k)
         rising = (b / 2 + (k + 2) / 2 * (b // _V) - (1 - _V) * b.deriv()).integ()
-        found.append(rising + (math.factorial(k + 1) - rising(1.0)))
-    return tuple(found)
+        polynomials.append(rising + (math.factorial(k + 1) - rising(1.0)))
+    return tuple(polynomials)
 
 
 def _lowered(a: Polynomial, k: int) -> Polynomial:

@@ -1,15 +1,18 @@
 r"""Polarised light: the Jones matrix of the local reflection, written without the frames that vanish in it.
 
 A facet that mirrors light into view reflects s and p light of its own plane of incidence, which differs from the s and
-p of the mean surface (84). (59)-(68) turn one into the other and divide by |k_r x k_i|^4, which is 0 in
-retro-reflection. The same matrix in space, with k_i = -light, k_r = view, x = k_i . k_r, u = light x view, U = [u]_x,
+p of the mean surface, He et al. 1991, eq. (84). Their eqs. (59)-(68) turn one into the other and divide by
+|k_r x k_i|^4, which is 0 in retro-reflection.
+
+The same matrix in space, with k_i = -light, k_r = view, x = k_i . k_r, u = light x view, U = [u]_x,
 
 .. math::
     J = \frac P2 [c c^T + (x k_r - k_i)(k_r - x k_i)^T] + \frac Q2 \Big[1 + U + \frac{U^2}{1 - x}\Big], \quad
     c = k_i \times k_r, \quad P = \frac{F_s}{2 c_d^2 (c_d q + s_d^2)}, \quad Q = \frac{2 c_d q F_s}{c_d q + s_d^2}
 
 is regular everywhere; c_d, s_d are cosine and sine of the local angle of incidence.
-Source: He et al. 1991, eqs. (34), (59)-(68), (84)-(86).
+Source: He, Torrance, Sillion & Greenberg 1991, "A comprehensive physical model for light reflection", DOI
+    10.1145/127719.122738, eqs. (34), (59)-(68), (84)-(86).
 """
 
 import math
@@ -20,7 +23,7 @@ from torch import Tensor
 from torchbrdf._numerics import cross, dot, horizon, safe_sqrt
 from torchbrdf.directions import Cosines, any_tangent, orthonormal_tangent
 from torchbrdf.fresnel import conductor_amplitudes, refracted_cosine
-from torchbrdf.models.he_torrance.lobe import Geometry, coherent, diffracted
+from torchbrdf.models.he_torrance.perfect_reflector import Geometry, directional_diffuse_of_waves, specular_share
 from torchbrdf.models.he_torrance.reflectance import check_surface
 
 
@@ -65,20 +68,20 @@ def he_torrance_polarised(
         Frames: s = direction of propagation x normal, p = s x direction of propagation.
     Raises: what `Cosines.of` and `he_torrance` raise.
     Deviations: as `he_torrance`. The uniform-diffuse part leaves unpolarised, half s and half p.
-    Source: He et al. 1991, eqs. (59)-(68), with the signs of (63), (64) repaired.
+    Source: He et al. 1991 (DOI 10.1145/127719.122738), eqs. (59)-(68), with the signs of (63), (64) repaired.
     """
     check_surface("he_torrance_polarised", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k, diffuse=diffuse)
     cosines = Cosines.of(normal, light, view)
     geometry = Geometry.of(cosines)
     surface = {"sigma0": sigma0[..., None], "tau": tau[..., None], "wavelength": torch.atleast_1d(wavelength)}
-    base = diffracted(geometry, **surface)
+    base = directional_diffuse_of_waves(geometry, **surface)
     state = unpolarised(base) if incident is None else incident
     jones = jones_matrix(normal, light, view, geometry, eta=eta, k=k, tangent=tangent)
     received = state[..., None, :, :]
-    lobe = base[..., None, None] * (jones @ received @ jones.mH)
+    directed = base[..., None, None] * (jones @ received @ jones.mH)
     power = received.diagonal(dim1=-2, dim2=-1).sum(-1).real
-    matte = torch.atleast_1d(diffuse) / math.pi * power
-    total = lobe + matte[..., None, None] * unpolarised(base)
+    uniform = torch.atleast_1d(diffuse) / math.pi * power
+    total = directed + uniform[..., None, None] * unpolarised(base)
     return total.masked_fill(~cosines.above_horizon[..., None, None, None], 0.0)
 
 
@@ -95,11 +98,11 @@ def polarised_specular_reflectivity(
     """`specular_reflectivity` for light of any polarisation: coherency (..., channel, 2, 2) of the mirrored light. [-]
 
     Args: cos (...) as `specular_reflectivity`; incident (..., 2, 2) as `he_torrance_polarised`.
-    Source: He et al. 1991, eqs. (59), (73); J = diag(F_s, F_p).
+    Source: He et al. 1991 (DOI 10.1145/127719.122738), eqs. (59), (73); J = diag(F_s, F_p).
     """
     check_surface("polarised_specular_reflectivity", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
     c = cos[..., None]
-    share = coherent(
+    share = specular_share(
         c,
         safe_sqrt((1 - c) * (1 + c)),
         sigma0=sigma0[..., None],

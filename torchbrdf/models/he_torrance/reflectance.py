@@ -8,7 +8,12 @@ from torch import Tensor
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
 from torchbrdf.fresnel import RELATIVE_INDEX, conductor
-from torchbrdf.models.he_torrance.lobe import Geometry, coherent, diffracted
+from torchbrdf.models.he_torrance.perfect_reflector import (
+    Geometry,
+    directional_diffuse_of_facets,
+    directional_diffuse_of_waves,
+    specular_share,
+)
 from torchbrdf.parameters import ABSORPTION_INDEX, ALBEDO, Interval
 
 # A length that is divided by. Far below any in a sensible unit, far above what squares to 0 in float32.
@@ -33,8 +38,8 @@ def check_channels(name: str, **channels: Tensor) -> None:
     """Raise ValueError unless the last axes (channel) of the parameters agree; single numbers stand for all."""
     counts = {part: value.shape[-1] for part, value in channels.items() if value.ndim}
     if len({count for count in counts.values() if count > 1}) > 1:
-        found = ", ".join(f"{part} {count}" for part, count in counts.items())
-        raise ValueError(f"{name} needs one entry for each channel of wavelength, eta, k and diffuse; found {found}.")
+        given = ", ".join(f"{part} {count}" for part, count in counts.items())
+        raise ValueError(f"{name} needs one entry for each channel of wavelength, eta, k and diffuse; found {given}.")
 
 
 def he_torrance(
@@ -66,25 +71,38 @@ def he_torrance(
             (channel,) or (..., channel). [-] in [0, 1]
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when a parameter leaves its domain or the numbers of channels differ.
-    Deviations: a/pi, where (72) prints a. G is evaluated as |h|^4/h_z^2, to which (76) reduces. Shadowing has the
+    Deviations: a/pi, where eq. (72) prints a. G is |h|^4/h_z^2, to which eq. (76) reduces. Shadowing has the
         factor exp(-b^2) of Smith's integral. Single reflection, tangent-plane (Kirchhoff) fields: tau should exceed
         the wavelength. Energy is not exactly conserved: with sigma0 = 0.05, tau = 3, lambda = 0.5 a perfect
         reflector (both parts) returns 1.022 of the light from 86 degrees and 0.44 at 89; nothing is clamped.
-    Source: He, Torrance, Sillion & Greenberg 1991, eqs. (4)-(9), (71)-(83).
+    Source: He, Torrance, Sillion & Greenberg 1991, "A comprehensive physical model for light reflection", DOI
+        10.1145/127719.122738, eqs. (4)-(9), (71)-(83).
     """
     check_surface("he_torrance", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k, diffuse=diffuse)
-    lobe = directional_diffuse(cosines, sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
-    return cosines.zero_below_horizon(lobe + uniform_diffuse(lobe, diffuse))
+    directed = directional_diffuse(cosines, sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
+    return cosines.zero_below_horizon(directed + uniform_diffuse(directed, diffuse))
 
 
 def directional_diffuse(
-    cosines: Cosines, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor, eta: Tensor, k: Tensor
+    cosines: Cosines,
+    *,
+    sigma0: Tensor,
+    tau: Tensor,
+    wavelength: Tensor,
+    eta: Tensor,
+    k: Tensor,
+    wave_optics: bool = True,
 ) -> Tensor:
-    """The diffracted lobe of `he_torrance` (..., channel), unchecked, arbitrary below the horizon. [1/sr]"""
+    """The directional-diffuse part of `he_torrance` (..., channel), unchecked, arbitrary below the horizon. [1/sr]
+
+    Without `wave_optics` in the limit of geometric optics, see `directional_diffuse_of_facets`.
+    """
     geometry = Geometry.of(cosines)
     fresnel = conductor(geometry.local_cos, eta=torch.atleast_1d(eta), k=torch.atleast_1d(k))
     lengths = {"sigma0": sigma0[..., None], "tau": tau[..., None], "wavelength": torch.atleast_1d(wavelength)}
-    return fresnel * diffracted(geometry, **lengths)
+    return fresnel * (directional_diffuse_of_waves if wave_optics else directional_diffuse_of_facets)(
+        geometry, **lengths
+    )
 
 
 def uniform_diffuse(like: Tensor, diffuse: Tensor) -> Tensor:
@@ -105,17 +123,19 @@ def specular_reflectivity(
     Returns: rho_s (..., channel). [-] Mirrored radiance = rho_s times the radiance of what is mirrored.
     Raises: ValueError when a parameter leaves its domain or the numbers of channels differ.
     Deviations: underflows to 0, gradient included, for g > 87 in float32.
-    Source: He et al. 1991, eqs. (6), (70), (73).
+    Source: He et al. 1991 (DOI 10.1145/127719.122738), eqs. (6), (70), (73).
     """
     check_surface("specular_reflectivity", sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
-    return mirror_reflectance(cos, sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
+    return unchecked_specular_reflectivity(cos, sigma0=sigma0, tau=tau, wavelength=wavelength, eta=eta, k=k)
 
 
-def mirror_reflectance(
+def unchecked_specular_reflectivity(
     cos: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor, eta: Tensor, k: Tensor
 ) -> Tensor:
     """`specular_reflectivity`, unchecked."""
     cos = cos[..., None]
     sin = safe_sqrt((1 - cos) * (1 + cos))
-    share = coherent(cos, sin, sigma0=sigma0[..., None], tau=tau[..., None], wavelength=torch.atleast_1d(wavelength))
+    share = specular_share(
+        cos, sin, sigma0=sigma0[..., None], tau=tau[..., None], wavelength=torch.atleast_1d(wavelength)
+    )
     return conductor(cos, eta=torch.atleast_1d(eta), k=torch.atleast_1d(k)) * share

@@ -1,6 +1,6 @@
 r"""Effective roughness: the rms height of those parts of the surface that are lit and seen.
 
-Heights are Gaussian; the shadowed valleys drop out. The apparent rms height is (80)-(83)
+Heights are Gaussian; the shadowed valleys drop out. The apparent rms height is, He et al. 1991, eqs. (80)-(83),
 
 .. math::
     \sigma = \sigma_0 [1 + (z_0/\sigma_0)^2]^{-1/2}, \quad
@@ -8,7 +8,8 @@ Heights are Gaussian; the shadowed valleys drop out. The apparent rms height is 
     K = \tan\theta\; \mathrm{erfc}\frac{\tau \cot\theta}{2\sigma_0}
 
 Both are one equation for (z0/sigma0)^2 = W0(K^2/8 pi) with Lambert's W, so that sigma = sigma0/sqrt(1 + W).
-Source: He et al. 1991, eqs. (80)-(83); the closed form is derived from them.
+Source: He, Torrance, Sillion & Greenberg 1991, "A comprehensive physical model for light reflection", DOI
+    10.1145/127719.122738, eqs. (80)-(83); the closed form is derived from them.
 """
 
 import math

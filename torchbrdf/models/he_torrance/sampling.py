@@ -1,8 +1,8 @@
-"""Directions drawn for the lobe and for the averaged spike of the He-Torrance model, in the frame of the surface.
+"""Directions drawn for the directional-diffuse and the averaged specular part of He-Torrance, in the surface's frame.
 
-The lobe is drawn from the visible facets of a microfacet surface: half of the draws from Beckmann facets as wide as the
-slopes, half from GGX facets as wide as slopes and diffraction together at the cosine of the view. Their tails fall like
-a power and outlast every exponential of the series, which bounds the weights.
+The directional-diffuse part is drawn from the visible facets of a microfacet surface: half of the draws from Beckmann
+facets as wide as the slopes, half from GGX facets as wide as slopes and diffraction together at the cosine of the view.
+Their tails fall like a power and outlast every exponential of the series, which bounds the weights.
 """
 
 import math
@@ -19,13 +19,13 @@ from torchbrdf.facets import (
     ggx_lambda,
     tangent_squared,
 )
-from torchbrdf.models.he_torrance.lobe import Geometry
+from torchbrdf.models.he_torrance.perfect_reflector import Geometry
 from torchbrdf.parameters import NARROWEST
 from torchbrdf.sampling import choose, mirrored, towards, visible_beckmann_facet, visible_ggx_facet
 
 
 def facet_width(cos: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
-    """Width alpha (...) of the facets that stand for the lobe of the longest wavelength, seen from a cosine (...). [-]
+    """Width alpha (...) of facets like the directional-diffuse part at the longest wavelength, from a cosine (...). [-]
 
     (2 sigma0/tau)^2 + (lambda/(2 pi tau cos))^2: slopes, and the angle of diffraction in half vectors.
     """
@@ -34,10 +34,10 @@ def facet_width(cos: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor)
     return (slopes * slopes + diffraction * diffraction).sqrt().clamp(NARROWEST, 1.0)
 
 
-def lobe_share(cos: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
-    """About which share (...) of the light from a cosine (...) that is not absorbed goes into the lobe. [-]
+def directional_diffuse_share(cos: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
+    """About which share (...) of the light from a cosine (...) that is not absorbed is directional diffuse. [-]
 
-    1 - exp(-g), at the edge of the lobe above the mirror direction: the lobe draws light from there at grazing.
+    1 - exp(-g), at the edge of that part above the mirror direction: it draws light from there at grazing.
     """
     wavelength = torch.atleast_1d(wavelength)
     above = (cos * cos + 2 / math.pi * wavelength.amax(-1) / tau).sqrt().clamp(max=1.0)
@@ -45,7 +45,7 @@ def lobe_share(cos: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) 
     return -torch.expm1(-phase * phase)
 
 
-def lobe_light(view: Tensor, narrow: Tensor, wide: Tensor, u: Tensor) -> Tensor:
+def directional_diffuse_light(view: Tensor, narrow: Tensor, wide: Tensor, u: Tensor) -> Tensor:
     """Light (..., 3) for a view (..., 3), widths (...) and u (..., 2); may lie below the horizon."""
     first, u1 = choose(u[..., 0], torch.full_like(u[..., 0], 0.5))
     u = torch.stack((u1, u[..., 1]), -1)
@@ -53,16 +53,16 @@ def lobe_light(view: Tensor, narrow: Tensor, wide: Tensor, u: Tensor) -> Tensor:
     return mirrored(view, torch.where(first[..., None], sharp, soft))
 
 
-def lobe_density(cosines: Cosines, narrow: Tensor, wide: Tensor) -> Tensor:
-    """Density (...) of `lobe_light`. [1/sr]"""
+def directional_diffuse_density(cosines: Cosines, narrow: Tensor, wide: Tensor) -> Tensor:
+    """Density (...) of `directional_diffuse_light`. [1/sr]"""
     half, steepness = HalfVector.of(cosines), tangent_squared(cosines.view)
     sharp = beckmann_distribution(half, alpha=narrow) / (1 + beckmann_lambda(narrow * narrow * steepness))
     soft = ggx_distribution(half, alpha=wide) / (1 + ggx_lambda(wide * wide * steepness))
     return (sharp + soft) / (8 * cosines.view)
 
 
-def spike_light(view: Tensor, solid_angle: float, u: Tensor) -> Tensor:
-    """Light (..., 3) about the mirror direction, where the spike of cones of this solid angle [sr] is not 0."""
+def specular_light(view: Tensor, solid_angle: float, u: Tensor) -> Tensor:
+    """Light (..., 3) about the mirror direction, where the specular part of cones of this solid angle [sr] is not 0."""
     image = view * view.new_tensor([-1.0, -1.0, 1.0])
     flat = _widest(solid_angle) * (1 - (1 - u[..., 0]).sqrt())  # 1 - cos(gamma)
     sine, turn = (flat * (2 - flat)).sqrt(), 2 * math.pi * u[..., 1]
@@ -70,8 +70,8 @@ def spike_light(view: Tensor, solid_angle: float, u: Tensor) -> Tensor:
     return towards(image, around.expand(torch.broadcast_shapes(around.shape, image.shape)))
 
 
-def spike_density(cosines: Cosines, solid_angle: float) -> Tensor:
-    """Density (...) of `spike_light`: falls linearly with 1 - cos(gamma) to 0 at the rim of the spike. [1/sr]"""
+def specular_density(cosines: Cosines, solid_angle: float) -> Tensor:
+    """Density (...) of `specular_light`: falls linearly with 1 - cos(gamma) to 0 at the rim of that part. [1/sr]"""
     geometry = Geometry.of(cosines)
     difference = geometry.cos_light - geometry.cos_view
     flat = (geometry.planar + difference * difference)[..., 0] / 2

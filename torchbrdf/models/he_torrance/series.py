@@ -49,13 +49,14 @@ def series_over_g(g: Tensor, t: Tensor) -> Tensor:
     Args:
         g: squared phase of the roughness, (v_z sigma)^2 >= 0. [-] Broadcasts with t.
         t: squared lateral phase, (v_xy tau)^2/4 >= 0. [-]
-        Neither is checked: both are squares. The sum over m of the paper is g times this.
+        Neither is checked: both are squares. The sum over m in eq. (78) is g times this.
     Returns: (...), in the dtype of the inputs, with first and second derivatives in reverse and forward mode.
     Raises: TypeError unless both are float32 or both float64; NotImplementedError for a third derivative.
     Accuracy: 1e-11 relative in float64, 1e-6 + 3 eps (1 + |ln(g S)|) in float32, where an exponent of 60 carries
         60 eps. Derivatives are evaluated in float64: 1e-10 of the larger of themselves and a thousandth of
         S/g/max(g, 1), rounded to the dtype. Exponentials below the smallest normal number are 0.
-    Source: He, Torrance, Sillion & Greenberg 1991, eqs. (7), (78).
+    Source: He, Torrance, Sillion & Greenberg 1991, "A comprehensive physical model for light reflection", DOI
+        10.1145/127719.122738, eqs. (7), (78).
     """
     if g.dtype != t.dtype or g.dtype not in _SCHEMES:
         raise TypeError(f"series_over_g: g and t must both be float32 or both float64; found {g.dtype} and {t.dtype}")
@@ -83,11 +84,11 @@ def _derivatives(g: Tensor, t: Tensor, orders: Sequence[int]) -> Tensor:
     pairs = _pairs(orders)
     # A derivative by g is a difference that changes sign: its digits are kept by float64 alone.
     dtype = torch.float64 if max(orders) > 0 else g.dtype
-    found = g.new_empty((len(pairs), g.numel()))
+    derivatives = g.new_empty((len(pairs), g.numel()))
     for start in range(0, g.numel(), _AT_A_TIME):
         part = slice(start, start + _AT_A_TIME)
-        _fill(found[:, part], g.reshape(-1)[part].to(dtype), t.reshape(-1)[part].to(dtype), pairs)
-    return found.view(len(pairs), *g.shape)
+        _fill(derivatives[:, part], g.reshape(-1)[part].to(dtype), t.reshape(-1)[part].to(dtype), pairs)
+    return derivatives.view(len(pairs), *g.shape)
 
 
 def _pairs(orders: Sequence[int]) -> list[tuple[int, int]]:
@@ -105,9 +106,9 @@ def _slopes(function, ctx) -> tuple[Tensor, Tensor]:
     raised = sorted({(n + 1, q) for n, q in pairs} | {(n, q + 1) for n, q in pairs})
     if max(n + q for n, q in raised) > _HIGHEST_DERIVATIVE:
         raise NotImplementedError(f"series_over_g has {_HIGHEST_DERIVATIVE} derivatives; one more was asked for")
-    found = function(*ctx.saved_tensors, [i for pair in raised for i in pair])
+    derivatives = function(*ctx.saved_tensors, [i for pair in raised for i in pair])
     by_g, by_t = ([raised.index((n + 1 - up, q + up)) for n, q in pairs] for up in (0, 1))
-    return found[by_g], found[by_t]
+    return derivatives[by_g], derivatives[by_t]
 
 
 def _pulled_back(function, ctx, upstream: Tensor) -> tuple[Tensor, Tensor, None]:
@@ -156,7 +157,7 @@ _captured.register_fake(lambda g, t, orders: g.new_empty((len(orders) // 2, *g.s
 _captured.register_autograd(lambda ctx, upstream: _pulled_back(_captured, ctx, upstream), setup_context=_remember)
 
 
-def _fill(found: Tensor, g: Tensor, t: Tensor, orders: list[tuple[int, int]]) -> None:
+def _fill(derivatives: Tensor, g: Tensor, t: Tensor, orders: list[tuple[int, int]]) -> None:
     """Write the derivatives (order, entry) of S/g at g, t (entry,), each entry in the way of its largest term."""
     scheme = _SCHEMES[g.dtype]
     ends = (*scheme.sums, *(end for end, _ in scheme.expansions[:-1]))
@@ -177,7 +178,7 @@ def _fill(found: Tensor, g: Tensor, t: Tensor, orders: list[tuple[int, int]]) ->
             means = _sum(*here, orders, m=end, terms=_terms(end, scheme.tail))
         else:
             means = expansion(*here, orders, degree=scheme.expansions[number - len(scheme.sums)][1])
-        for row, mean in zip(found, means, strict=True):
+        for row, mean in zip(derivatives, means, strict=True):
             row.index_copy_(0, chosen, mean.to(row.dtype))
 
 

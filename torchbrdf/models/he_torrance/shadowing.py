@@ -4,7 +4,9 @@ r"""Smith's masking and shadowing of a surface with Gaussian slopes, written so 
     S_1 = \frac{1 - \tfrac12\mathrm{erfc}(b)}{1 + \Lambda(b)} = \frac{N}{N + e^{-b^2}}, \quad
     N = \sqrt\pi\, b\,(1 + \mathrm{erf}\, b), \quad b = \frac{\tau \cot\theta}{2 \sigma_0}
 
-Source: Smith 1967; He et al. 1991, eqs. (23)-(25). The factor exp(-b^2) of Lambda follows from Smith's integral.
+Source: Smith 1967, "Geometrical shadowing of a random rough surface", DOI 10.1109/TAP.1967.1138991; He, Torrance,
+    Sillion & Greenberg 1991, "A comprehensive physical model for light reflection", DOI 10.1145/127719.122738,
+    eqs. (23)-(25). The factor exp(-b^2) of Lambda follows from Smith's integral.
 """
 
 import math
@@ -25,7 +27,7 @@ class Shadowing(NamedTuple):
     Attributes:
         over_cos: S_1/cos(theta): 1/cos for steep directions, sqrt(pi) tau/(2 sigma0 sin) at grazing. [-]
         visibility: S_1 itself. [-] in (0, 1]
-        k: tan(theta) erfc(b), the share of heights that is hidden in (82). [-]
+        k: tan(theta) erfc(b), the share of heights that is hidden in He et al. 1991, eq. (82). [-]
     """
 
     over_cos: Tensor

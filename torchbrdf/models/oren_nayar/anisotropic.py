@@ -6,10 +6,13 @@ from typing import Literal, final
 import torch
 from torch import Tensor
 
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
+from torchbrdf.effects import ANISOTROPY
 from torchbrdf.linear import ImageBRDF
 from torchbrdf.models.oren_nayar.images import Bounces, cavity_images, flat_coefficients
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
+from torchbrdf.models.oren_nayar.rough_surface import RoughSurface
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed, kept
 from torchbrdf.quadrature import gauss_legendre
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
@@ -38,7 +41,8 @@ class AnisotropicRoughSurface(CltcSampled, ImageBRDF):
     Raises: ValueError outside the domains, and without a tangent.
     Deviations: every cavity adds kinks of its own, so the error falls slowly with the number of nodes; three and
         more bounces are left out. With derivatives for sigma, nodes * azimuths * bounces numbers a pixel are kept.
-    Source: Oren & Nayar 1994 (long version), eqs. (8), (22); two widths: own.
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+        (1995, DOI 10.1007/BF01679684), eqs. (8), (22); two widths: own.
     """
 
     anisotropic = True
@@ -96,6 +100,15 @@ class AnisotropicRoughSurface(CltcSampled, ImageBRDF):
     def component_coefficients(self) -> dict[str, Tensor]:
         weights = anisotropic_weights(self.sigma_x, self.sigma_y, nodes=self.nodes, azimuths=self.azimuths)
         return flat_coefficients(weights, self.albedo, bounces=self._bounces)
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        """The isotropic surface of the mean variance."""
+        sigma = ((self.sigma_x.square() + self.sigma_y.square()) / 2).sqrt().detach()
+        held = all(isinstance(kept(self, name), fixed) for name in ("sigma_x", "sigma_y"))
+        stand_in = RoughSurface(
+            albedo=kept(self, "albedo"), sigma=fixed(sigma) if held else sigma, nodes=self.nodes, bounces=self.bounces
+        )
+        return {ANISOTROPY: [Option("one width in all azimuths", (ANISOTROPY,), stand_in)]}
 
 
 def slope_vectors(like: Tensor, *, nodes: int, azimuths: int) -> tuple[Tensor, Tensor, Tensor]:

@@ -1,7 +1,8 @@
 """The paper's closed azimuth means of one slope angle: exact in and across the plane of incidence, interpolated in
 between.
 
-Source: Oren & Nayar 1994, long version, eqs. (39)-(45), (49). Their own rung of the ladder; the exact means are in
+Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+    (1995, DOI 10.1007/BF01679684), eqs. (39)-(45), (48), (49). Their own rung of the ladder; the exact means are in
     `azimuth`.
 """
 
@@ -10,13 +11,13 @@ import math
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import safe_divide, safe_sqrt
+from torchbrdf._numerics import positive_part, safe_divide, safe_sqrt
 from torchbrdf.models.oren_nayar.azimuth import Lobes, saturated_lobes
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane
 
 
 def direct_mean_paper(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> Tensor:
-    r"""Direct BRDF of one slope angle, unit albedo, eqs. (24)/(45) (...). [1/sr]
+    r"""Direct BRDF of one slope angle, unit albedo, Oren & Nayar 1994, eqs. (24), (45) (...). [1/sr]
 
     .. math:: \frac{1}{\pi}\cos\theta_a\{1 + \cos\Delta\,(A_1\tan\beta + A_2) + (1-|\cos\Delta|)A_3\}
     """
@@ -26,13 +27,14 @@ def direct_mean_paper(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor
     # normal, so it is split off.
     steep, half_steep, half_flat = _ordered(lobes)
     in_plane = _in_plane(plane, steep, half_steep, lobes)
-    forward = (2 / math.pi) * (half_flat - _flat(lobes) * half_flat.sin()) * cos_delta.clamp(max=0)
-    return cos_slope * (1 + in_plane + forward + (1 - cos_delta.abs()) * _across(plane, lobes)) / math.pi
+    away = positive_part(-cos_delta)
+    forward = (2 / math.pi) * (half_flat - _flat(lobes) * half_flat.sin()) * away
+    return cos_slope * (1 + in_plane - forward + (1 - cos_delta.abs()) * _across(plane, lobes)) / math.pi
 
 
 def two_bounce_mean_paper(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> Tensor:
-    """Two-bounce BRDF of one slope angle, unit albedo, eq. (49): (48) averaged in and across the plane, cosine in
-    between (...). [1/sr]
+    """Two-bounce BRDF of one slope angle, unit albedo, Oren & Nayar 1994, eq. (49): their exchange (48) averaged in and
+    across the plane, cosine in between (...). [1/sr]
     """
     lobes = saturated_lobes(plane, cos_slope=cos_slope, tan_slope=tan_slope)
     steep, half_steep, half_flat = _ordered(lobes)
@@ -51,7 +53,9 @@ def _in_plane(plane: SlopePlane, steep: Tensor, half_steep: Tensor, lobes: Lobes
 
 
 def _across(plane: SlopePlane, lobes: Lobes) -> Tensor:
-    """A3 of (45): what masking and shadowing share across the plane, once f_A + f_B passes pi/2."""
+    """A3 of Oren & Nayar 1994, eq. (45): what masking and shadowing share across the plane, once f_A + f_B passes
+    pi/2.
+    """
     excess = lobes.half_light + lobes.half_view - 0.5 * math.pi
     roots = _half_tangent(lobes.light) + _half_tangent(lobes.view)
     hypotenuse = lobes.tan_slope * safe_sqrt(plane.tan_light * plane.tan_light + plane.tan_view * plane.tan_view)

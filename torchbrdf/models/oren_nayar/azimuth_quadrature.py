@@ -1,13 +1,14 @@
-r"""Azimuth means of interreflected light over facets of one slope angle: closed form of (48) plus a small correction by
-quadrature.
+r"""Azimuth means of interreflected light over facets of one slope angle: closed form of an approximation plus a small
+correction by quadrature.
 
-Exact exchange and the mean of (48) differ only where a facet is shadowed or masked. With z the light's and b the view's
+Exact exchange, Oren & Nayar 1994, eq. (19), and the mean of the approximate one, their eq. (48), differ only where a
+facet is shadowed or masked. With z the light's and b the view's
 projection, the difference is a sum of
     (1 + c(b)) e(z) + (1 + c(z)) e(b)     e(z) <= 0 on the lobe z > 1, 0 elsewhere: "one direction is cut",
     M(z, b)                               on the overlap z > 1, b > 1: "both are cut",
 so the quadrature runs over two half lobes and over the two overlaps of the lobes, on which every integrand is analytic;
-nodes never straddle a kink and lobes that do not exist have zero width. Own derivation from (19); see
-`interreflection.two_bounce_integrand` for the notation.
+nodes never straddle a kink and lobes that do not exist have zero width. Own derivation from
+Oren & Nayar 1994, eq. (19); see `interreflection` for the source and `two_bounce_integrand` there for the notation.
 """
 
 import math
@@ -16,7 +17,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import safe_divide, safe_sqrt
+from torchbrdf._numerics import safe_divide
 from torchbrdf.models.oren_nayar.azimuth import Lobes, overlap
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, strip_means
 from torchbrdf.models.oren_nayar.interreflection import reach, strip_mismatch
@@ -50,23 +51,32 @@ def half_lobe(half: Tensor, projection: Tensor, order: int, *, scale: Tensor | N
 
 
 def overlap_nodes(
-    lobes: Lobes, angle: Tensor, order: int, *, crossing: Tensor | None = None, scale: Tensor | None = None
+    lobes: Lobes,
+    angle: Tensor,
+    order: int,
+    *,
+    crossing: Tensor | None = None,
+    distance: Tensor | None = None,
+    scale: Tensor | None = None,
 ) -> Overlap:
     """Nodes on the overlap of lobes that are `angle` apart, (..., order).
 
-    With `crossing` and `scale` (the reference) in four graded pieces, (..., 4 order): dense at the rims and where the
-    two projections cross, which is almost a kink on steep slopes.
+    With `crossing`, `distance` (of the two points of the slope plane) and `scale` (the reference) in four graded
+    pieces, (..., 4 order): dense at the rims and where the two projections cross, which is almost a kink on steep
+    slopes.
     """
     low, high = overlap(lobes, angle)
     x, weight = gauss_legendre(order, low)
-    if crossing is None or scale is None:
+    if crossing is None or distance is None or scale is None:
         psi = low[..., None] + (high - low)[..., None] * x
         weights = (high - low)[..., None] * weight
     else:
         turn = torch.minimum(torch.maximum(crossing, low), high)
-        slope = safe_sqrt(lobes.light**2 + lobes.view**2 - 2 * lobes.light * lobes.view * angle.cos())
+        slope = lobes.tan_slope * distance
         height = (lobes.light * turn.cos()).clamp(min=1)
-        bend = safe_divide(lobes.cos_slope * (height - 1) * (height + 1), slope, where=slope > 0)
+        # where the nodes lie is no concern of the derivative, and beside p = q it would be any number
+        bend = safe_divide(lobes.cos_slope * (height - 1) * (height + 1), slope, where=slope > 0).detach()
+        bend = bend.masked_fill(slope <= 0, math.inf)  # projections that are one do not cross
         pieces = []
         for end, sign, length in ((low, 1, 0.5 * (turn - low)), (high, -1, 0.5 * (high - turn))):
             for start, side, width in (
@@ -117,11 +127,11 @@ def two_bounce_mean(
     """
     c = lobes.cos_slope
     scale = root_scale(plane, lobes) if graded else None
-    crossings = (plane.opposite_crossing, plane.crossing) if graded else (None, None)
+    near, far = _graded(plane, graded)
     one_cut = _lobe_mean(plane, lobes, order, scale)
-    facing = overlap_nodes(lobes, math.pi - plane.delta, order, crossing=crossings[0], scale=scale)
+    facing = overlap_nodes(lobes, math.pi - plane.delta, order, scale=scale, **far)
     both_cut = (facing.weight * _both_cut(facing.light, facing.view, c[..., None])).sum(-1)
-    same = overlap_nodes(lobes, plane.delta, order, crossing=crossings[1], scale=scale)
+    same = overlap_nodes(lobes, plane.delta, order, scale=scale, **near)
     rim = (same.view - 1) * one_cut_share(same.light, c[..., None]) + (same.light - 1) * one_cut_share(
         same.view, c[..., None]
     )
@@ -131,8 +141,20 @@ def two_bounce_mean(
     return c * ((1 - c) * (1 - correlation) + correction) / math.pi
 
 
+def _graded(plane: SlopePlane, graded: bool) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+    """Where the projections on one facet, and on two opposite ones, cross: what `overlap_nodes` grades its nodes by."""
+    if not graded:
+        return {}, {}
+    return (
+        {"crossing": plane.crossing, "distance": plane.apart},
+        {"crossing": plane.opposite_crossing, "distance": plane.opposed},
+    )
+
+
 def one_cut_share(z: Tensor, cos_slope: Tensor) -> Tensor:
-    """e(z) / S^2 = 1/P(z) - 1/(1+C) for z >= 1 (...): what (48) overrates when the light alone is cut. [-]"""
+    """e(z) / S^2 = 1/P(z) - 1/(1+C) for z >= 1 (...): what Oren & Nayar 1994, eq. (48), overrates
+    when the light alone is cut. [-]
+    """
     return 1 / reach(z, cos_slope) - 1 / (1 + cos_slope)
 
 
@@ -146,13 +168,15 @@ def _lobe_mean(plane: SlopePlane, lobes: Lobes, order: int, scale: Tensor | None
         z, weight = half_lobe(half, projection, order, scale=scale)
         share = weight * one_cut_share(z, lobes.cos_slope[..., None])
         # b = -(p.q / |p|^2) z + an odd part that averages out
-        slant = safe_divide(plane.dot, tangent * tangent, where=tangent > 0)
+        slant = safe_divide(plane.dot, tangent * tangent, where=half > 0)
         total = total + torch.where(half > 0, share.sum(-1) - slant * (share * z).sum(-1), 0.0)
     return total
 
 
 def _both_cut(z: Tensor, b: Tensor, cos_slope: Tensor) -> Tensor:
-    """M(z, b) / S^2: exact exchange less (48) less the two single cuts; 0 on the rim of the overlap."""
+    """M(z, b) / S^2: exact exchange less that of Oren & Nayar 1994, eq. (48), less the two single cuts; 0 on the
+    rim of the overlap.
+    """
     return (z + b - 2) / (1 + cos_slope) - strip_mismatch(z, b, cos_slope)
 
 
@@ -173,11 +197,10 @@ def higher_bounce_means(
     """
     whole = strip_means(modes, torch.ones_like(modes.cos_slope)[:, None])[..., 0]  # G_n(1), (K, N)
     scale = root_scale(plane, lobes) if graded else None
-    crossings = (plane.crossing, plane.opposite_crossing) if graded else (None, None)
     straight, slanted = _mode_lobes(plane, lobes, modes, whole, order=order, scale=scale)
     pairs, rims = [], []
-    for angle, crossing in zip((plane.delta, math.pi - plane.delta), crossings, strict=True):
-        pair, rim = _mode_overlap(overlap_nodes(lobes, angle, order, crossing=crossing, scale=scale), modes, whole)
+    for angle, placed in zip((plane.delta, math.pi - plane.delta), _graded(plane, graded), strict=True):
+        pair, rim = _mode_overlap(overlap_nodes(lobes, angle, order, scale=scale, **placed), modes, whole)
         pairs.append(pair)
         rims.append(rim)
     means = []
@@ -203,7 +226,7 @@ def _mode_lobes(
     ):
         z, weight = half_lobe(half, projection, order, scale=scale)
         change = _coupling_change(modes, whole, z) * weight[..., None, :]
-        slant = safe_divide(plane.dot, tangent * tangent, where=tangent > 0)
+        slant = safe_divide(plane.dot, tangent * tangent, where=half > 0)
         straight.append(change.sum(-1))
         slanted.append(torch.where((half > 0)[..., None], slant[..., None] * (change * z[..., None, :]).sum(-1), 0.0))
     return straight[0] + straight[1], slanted[0] + slanted[1]

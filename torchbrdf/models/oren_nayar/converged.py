@@ -4,7 +4,8 @@ The azimuth mean of one slope angle is exact (direct) or split at every kink (in
 slope angle it has kinks of its own where a direction starts to be cut (tan theta_a = 1/tan theta) and where two lobes
 start to overlap; the slope integral is split there, at a few widths of the Gaussian, and at multiples of the kinks,
 because beyond a kink the mean varies with the *ratio* of the angle to the kink.
-Source: `equations/oren_nayar.md`, section 6.
+Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+    (1995, DOI 10.1007/BF01679684), eqs. (25), (26), in the form of `docs/equations/oren_nayar.md`, section 6.
 """
 
 import math

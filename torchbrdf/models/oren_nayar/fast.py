@@ -8,15 +8,18 @@ import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal, NamedTuple, final
+from typing import Any, Literal, NamedTuple, final
 
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import BRDF
+from torchbrdf import effects
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import Cosines
+from torchbrdf.models.oren_nayar.functional import OrenNayar
 from torchbrdf.models.oren_nayar.ring import KAPPA, KNEE, Ring, Term, chebyshev, chebyshev_slope, contract, knee, ring
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.models.rungs import Member, stand_ins
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 Bounces = Literal[2, "all"]
@@ -39,16 +42,16 @@ _PARTS: dict[Bounces, tuple[str, ...]] = {
 
 
 def _read(path: Path) -> _Fit:
-    found = json.loads(path.read_text())
+    numbers = json.loads(path.read_text())
     names = _PARTS["all"]
-    terms = {n: [(t["factor"], *t["powers"]) for t in found[n]] for n in names}
-    orders = {n: [t["order"] for t in found[n]] for n in names}
-    series = {n: [t["series"] for t in found[n]] for n in names}
+    terms = {n: [(t["factor"], *t["powers"]) for t in numbers[n]] for n in names}
+    orders = {n: [t["order"] for t in numbers[n]] for n in names}
+    series = {n: [t["series"] for t in numbers[n]] for n in names}
     rows = []
     for name in names:
         for order, row in zip(orders[name], series[name], strict=True):
             rows.append([*[0.0] * (len(row) * order), *row, *[0.0] * (len(row) * (2 - order))])
-    return _Fit(terms, orders, series, torch.tensor(rows, dtype=torch.float64), tuple(found["resonance"]))
+    return _Fit(terms, orders, series, torch.tensor(rows, dtype=torch.float64), tuple(numbers["resonance"]))
 
 
 _FIT = _read(Path(__file__).with_name("fast_rough_surface.json"))
@@ -84,7 +87,7 @@ def fast_rough_surface(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, bounc
         bounded f cos, no figures. At light = view, a cone of the exact reflectance, the subgradient is 0. Compiled
         with one trained sigma, first derivatives only: take second ones from the function as it is.
     Source: fitted here to the exact model (`examples/fast_fit`); small-sigma form from the expansion
-        of the integral, d ~ 1 - sigma^2 + sigma^2 p.q, i ~ sigma^2.
+        of the integral, d ~ 1 - sigma^2 + sigma^2 p.q, i ~ sigma^2 (`docs/equations/oren_nayar.md`, section 6).
     """
     ALBEDO.check("fast_rough_surface: albedo", albedo)
     ROUGHNESS.check("fast_rough_surface: sigma", sigma)
@@ -206,3 +209,17 @@ class FastRoughSurface(CltcSampled, BRDF):
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         return _components(cosines, self.albedo, self.sigma, self.bounces)
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model."""
+        material: dict[str, Any] = {name: kept(self, name) for name in ("albedo", "sigma")}
+        two = (effects.ROUGHNESS, effects.INTERREFLECTION, effects.C3_TERM)
+        simpler = OrenNayar(**material).members()
+        if self.bounces == 2:
+            return [*simpler, Member("fast, 2 bounces", two, self)]
+        every = (effects.ROUGHNESS, effects.INTERREFLECTION, effects.LATER_BOUNCES, effects.C3_TERM)
+        rough = FastRoughSurface(**material, bounces=2)
+        return [*simpler, Member("fast, 2 bounces", two, rough), Member("fast, all bounces", every, self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())

@@ -1,15 +1,20 @@
-"""Functional approximation of the Oren-Nayar integral, (27)-(29) of the paper's long version."""
+"""Functional approximation of the integral of Oren & Nayar 1994, eqs. (27)-(29) of the long version."""
 
 import math
-from typing import final
+from typing import Any, final
 
 import torch
 from torch import Tensor
 
+from torchbrdf import effects
+from torchbrdf._numerics import positive_part
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
+from torchbrdf.models.rungs import Member, stand_ins
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
@@ -33,10 +38,11 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo or sigma leave their domains.
     Deviations: a fit. From the exact model with all bounces it errs by 6 % rms and 74 % at worst
-        (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`);
+        (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/benchmarks/ladder.py`);
         it turns negative at forward grazing for sigma > 0.66 rad, and at rho = 1 its directional albedo
         reaches 1.05 at grazing.
-    Source: Oren & Nayar 1994 (long version), eqs. (27)-(29).
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+        (1995, DOI 10.1007/BF01679684), eqs. (27)-(29).
     """
     ALBEDO.check("oren_nayar: albedo", albedo)
     ROUGHNESS.check("oren_nayar: sigma", sigma)
@@ -55,7 +61,7 @@ def fields(cosines: Cosines, sigma: Tensor, *, c3: bool = True) -> tuple[Tensor,
 
 
 def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """The four functions of geometry in (27), (28), each (...), without an angle.
+    """The four functions of geometry in Oren & Nayar 1994, eqs. (27), (28), each (...), without an angle.
 
     1, cos(dphi) C2 tan(beta) and (1 - |cos(dphi)|) C3 tan((alpha+beta)/2) with the constants and the
     sigma-quotients taken out, and cos(dphi) (2 beta/pi)^2. Every quotient left is bounded or has
@@ -64,8 +70,9 @@ def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor
     g = cosines
     beta_squared = g.sin_beta * g.sin_beta * g.beta_over_sine**2
     # tan(beta) cos(dphi) = (in_plane / sin(alpha)) / cos(beta); the cubic only acts where dphi > 90 deg
-    forward = g.in_plane.clamp(max=0) * g.sine_ratio * (2 / math.pi) ** 3 * g.beta_over_sine * beta_squared
-    along = (g.in_plane - forward) / g.beta
+    away = positive_part(-g.in_plane)
+    cubic = away * g.sine_ratio * (2 / math.pi) ** 3 * g.beta_over_sine * beta_squared
+    along = (g.in_plane + cubic) / g.beta
     bounce = g.in_plane * g.sine_ratio * g.beta_over_sine**2 * (2 / math.pi) ** 2
     if not c3:
         return torch.ones_like(g.beta), along, torch.zeros_like(g.beta), bounce
@@ -149,3 +156,15 @@ class OrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
     def component_coefficients(self) -> dict[str, Tensor]:
         parts = {"direct": direct_coefficients, "interreflection": interreflection_coefficients}
         return {name: parts[name](self.albedo, self.sigma) for name, included in self._parts.items() if included}
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model, without interreflection where it has none."""
+        material: dict[str, Any] = {name: kept(self, name) for name in ("albedo", "sigma")}
+        bounce = self._parts["interreflection"]
+        plain = (effects.ROUGHNESS, effects.INTERREFLECTION) if bounce else (effects.ROUGHNESS,)
+        without = Member("functional without C3", plain, OrenNayar(**material, interreflection=bounce, c3=False))
+        own = Member("functional", (*plain, effects.C3_TERM), self) if self.c3 else without._replace(model=self)
+        return [*QualitativeOrenNayar(**material).members(), without, own]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members()) if self._parts["direct"] else {}

@@ -5,7 +5,8 @@ r"""Images of a rough surface of unit albedo: what the geometry contributes, slo
 D (direct), I (two bounces) and H (more) depend on the directions only, the weights w on the roughness only, the rest on
 the albedo only: a new sigma or rho costs multiply-adds. The images of a facet come from `attenuation` (what is lit and
 seen) and `interreflection` (what the facets exchange); their azimuth means from `azimuth` and `azimuth_quadrature`.
-Source: Oren & Nayar 1994, eqs. (8), (22), (23), (25).
+Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+    (1995, DOI 10.1007/BF01679684), eqs. (8), (22), (23), (25); bounces beyond the second: own derivation.
 """
 
 import math
@@ -42,12 +43,12 @@ class Bounces(NamedTuple):
 
     def named(self, direct: Tensor, two_bounce: Tensor, higher: Tensor) -> dict[str, Tensor]:
         """The parts that are followed, by name."""
-        found = {"direct": direct}
+        parts = {"direct": direct}
         if self.two:
-            found["two_bounce"] = two_bounce
+            parts["two_bounce"] = two_bounce
         if self.modes:
-            found["higher"] = higher
-        return found
+            parts["higher"] = higher
+        return parts
 
 
 class Images(NamedTuple):
@@ -102,7 +103,7 @@ def cavity_images(
     bounces: Bounces,
     modes: CavityModes | None = None,
 ) -> Images:
-    """Mean of the two facets u and -u of each cavity, eq. (22): exact, no azimuth mean.
+    """Mean of the two facets u and -u of each cavity, Oren & Nayar 1994, eq. (22): exact, no azimuth mean.
 
     Args: u.p, u.q and cos(theta_a), broadcast to (..., K); `modes` of those K slopes for three and more bounces.
     Returns: `Images`, not masked at the horizon. [1/sr]
@@ -139,11 +140,11 @@ def flat_coefficients(
     if eigenvalues is not None:
         higher = (shares[..., None, None] * bounce_coefficients(eigenvalues, rho[..., 0])).flatten(-3)
         counts[2] = higher.shape[-1]
-    found = {}
+    padded = {}
     for position, (name, part) in enumerate(bounces.named(direct, two, higher).items()):
         before, after = sum(counts[:position]), sum(counts[position + 1 :])
-        found[name] = torch.nn.functional.pad(part, (before, after))
-    return found
+        padded[name] = torch.nn.functional.pad(part, (before, after))
+    return padded
 
 
 def added(images: Images, albedo: Tensor, *, bounces: Bounces, eigenvalues: Tensor | None = None) -> dict[str, Tensor]:

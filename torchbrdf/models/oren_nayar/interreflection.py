@@ -3,10 +3,11 @@ eigenmodes.
 
 Coordinates: x in [0, 1] from the valley to the ridge on each facet. The facets exchange light through the symmetric
     kernel K(x, y) = (1/2) sin^2(2 theta_a) x y / (x^2 + 2 x y cos(2 theta_a) + y^2)^(3/2)                          =
-    eq. (14) / pi
+    Oren & Nayar 1994, eq. (14), over pi
 and the radiosity obeys B = rho (E + K B'), B' = rho (E' + K B) with E constant on the lit strip. Projections: z = -u.p
-is how steeply the light meets the *opposite* facet, b = u.q how steeply the view meets the considered one. Source: Oren
-& Nayar 1994, eqs. (12)-(20), (48).
+is how steeply the light meets the *opposite* facet, b = u.q how steeply the view meets the considered one.
+Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+    (1995, DOI 10.1007/BF01679684), eqs. (12)-(20), (48).
 """
 
 import math
@@ -18,12 +19,15 @@ from torchbrdf._numerics import safe_divide, safe_sqrt
 
 
 def two_bounce_factor(hidden_light: Tensor, hidden_view: Tensor, *, cos_slope: Tensor) -> Tensor:
-    r"""Exchange between the lit strip [m_s, 1] of one facet and the visible strip [m_v, 1] of the other, eq. (19).
+    r"""Exchange between the lit strip [m_s, 1] of one facet and the visible strip [m_v, 1] of the other.
 
     .. math:: IF = (\pi/2)[\delta(1,1) + \delta(m_s,m_v) - \delta(1,m_s) - \delta(1,m_v)],\quad
               \delta(x,y) = x + y - d(x,y) = 4xy\sin^2\theta_a / (x+y+d(x,y))
 
-    The delta form has the factor sin^2 in every term; the four distances of (19) cancel to nothing on shallow slopes.
+    The delta form has the factor sin^2 in every term; the four distances of the source's eq. (20) cancel to
+    nothing on shallow slopes.
+
+    Source: Oren & Nayar 1994, eqs. (19), (20).
 
     Args: hidden fractions m_s, m_v and cos(theta_a), broadcastable (...). [-]
     Returns: IF (...). [-] in [0, pi (1 - cos(theta_a))]
@@ -36,8 +40,8 @@ def two_bounce_factor(hidden_light: Tensor, hidden_view: Tensor, *, cos_slope: T
 
 
 def two_bounce_factor_approximate(hidden_light: Tensor, hidden_view: Tensor, *, cos_slope: Tensor) -> Tensor:
-    """IF as if every strip exchanged the mean share: pi (1 - cos(theta_a)) (1 - m_s)(1 - m_v), eq. (48); exact when
-    nothing is hidden.
+    """IF as if every strip exchanged the mean share: pi (1 - cos(theta_a)) (1 - m_s)(1 - m_v); exact when
+    nothing is hidden. Source: Oren & Nayar 1994, eq. (48).
     """
     return math.pi * (1 - cos_slope) * (1 - hidden_light) * (1 - hidden_view)
 
@@ -46,8 +50,9 @@ def two_bounce_integrand(opposite_light: Tensor, view_projection: Tensor, *, cos
     r"""X' Y IF / pi, divided by sin^2(theta_a), in a form without cancellation and without divisions by X' or Y (own
     derivation).
 
-    With z >= 1, b >= 1, C = cos(theta_a), P(z) = zC + sqrt(z^2 C^2 + S^2) and D^2 = (z-b)^2 + C^2 (z^2-1)(b^2-1), eq.
-    (19) collapses to H(z, b) = (1+b)/P(z) + (1+z)/P(b) - (z-b)^2 / (D + C(zb - 1)); below 1 either argument enters H as
+    With z >= 1, b >= 1, C = cos(theta_a), P(z) = zC + sqrt(z^2 C^2 + S^2) and D^2 = (z-b)^2 + C^2 (z^2-1)(b^2-1), the
+    exchange of Oren & Nayar 1994, eq. (19), collapses to
+    H(z, b) = (1+b)/P(z) + (1+z)/P(b) - (z-b)^2 / (D + C(zb - 1)); below 1 either argument enters H as
     1 and as a factor (1+z)/2.
 
     Args: z = -u.p and b = u.q (...), C broadcastable. [-]

@@ -1,4 +1,4 @@
-"""Qualitative Oren-Nayar model, (30): the two-term form in common use."""
+"""Qualitative model of Oren & Nayar 1994, eq. (30): the two-term form in common use."""
 
 import math
 from typing import final
@@ -6,9 +6,13 @@ from typing import final
 import torch
 from torch import Tensor
 
+from torchbrdf import effects
+from torchbrdf._numerics import positive_part
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
+from torchbrdf.models.rungs import Member, lambert, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
@@ -24,13 +28,14 @@ def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: 
         cosines: of light, view and phase angle, each (...).
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
         sigma: roughness, scalar or (...). [rad] in [0, pi/2]; 0 is Lambert exactly.
-        a_constant: 0.33; the paper's footnote offers 0.57 to make up for the missing interreflection.
+        a_constant: 0.33; footnote 7 of the source offers 0.57 to make up for the missing interreflection.
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo or sigma leave their domains.
     Deviations: from the exact model with all bounces 15 % rms and 219 % (0.33) or 250 % (0.57) at worst
-        (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`).
-        At the kink cos(dphi) = 0 the subgradient is that of the flat side.
-    Source: Oren & Nayar 1994, eq. (30) and footnote 7 of the long version.
+        (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/benchmarks/ladder.py`).
+        At the kink cos(dphi) = 0 the subgradient is the mean of both sides.
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, eq. (30), and
+        footnote 7 of its long version (1995, DOI 10.1007/BF01679684).
     """
     ALBEDO.check("qualitative: albedo", albedo)
     ROUGHNESS.check("qualitative: sigma", sigma)
@@ -47,7 +52,7 @@ def field(cosines: Cosines, sigma: Tensor, a_constant: float) -> Tensor:
 
 def geometry_terms(cosines: Cosines) -> tuple[Tensor, Tensor]:
     """1 and max(0, cos(dphi)) sin(alpha) tan(beta), each (...), without an angle."""
-    return torch.ones_like(cosines.beta), cosines.in_plane.relu() / cosines.beta
+    return torch.ones_like(cosines.beta), positive_part(cosines.in_plane) / cosines.beta
 
 
 def qualitative_coefficients(albedo: Tensor, sigma: Tensor, a_constant: float) -> Tensor:
@@ -102,3 +107,10 @@ class QualitativeOrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
 
     def component_coefficients(self) -> dict[str, Tensor]:
         return {"direct": qualitative_coefficients(self.albedo, self.sigma, self.a_constant)}
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model."""
+        return [lambert(self), Member(f"qualitative ({self.a_constant:g})", (effects.ROUGHNESS,), self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())

@@ -1,22 +1,36 @@
 """The exact rough surface: V-cavities of many slopes, their azimuth mean, and the bounces between their facets."""
 
 from abc import abstractmethod
-from typing import Literal, final
+from typing import Any, Literal, final
 
 import torch
 from torch import Tensor
 
+from torchbrdf import effects
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import ImageBRDF
 from torchbrdf.models.oren_nayar.azimuth_paper import direct_mean_paper, two_bounce_mean_paper
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, modes_of
+from torchbrdf.models.oren_nayar.fast import FastRoughSurface
+from torchbrdf.models.oren_nayar.functional import OrenNayar
 from torchbrdf.models.oren_nayar.images import Bounces, flat_coefficients, mean_images
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane, slope_plane
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Simplex, fixed
+from torchbrdf.models.rungs import Member, stand_ins
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Simplex, fixed, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 from torchbrdf.slopes import gaussian_weights, shared_slopes
 
 BounceCount = Literal[1, 2, "all"]
+
+# The bounces that may be followed, and what each simulates besides roughness and C3.
+_BOUNCES: dict[BounceCount, tuple[str, tuple[str, ...]]] = {
+    1: ("1 bounce", ()),
+    2: ("2 bounces", (effects.INTERREFLECTION,)),
+    "all": ("all bounces", (effects.INTERREFLECTION, effects.LATER_BOUNCES)),
+}
+# Numbers of slopes from a coarse surface to one that is as good as any for most purposes.
+_COARSER = (4, 8, 16)
 
 
 class SharedSlopes(CltcSampled, ImageBRDF):
@@ -50,7 +64,7 @@ class SharedSlopes(CltcSampled, ImageBRDF):
     def images(self, *coordinates: Tensor) -> Tensor:
         plane = SlopePlane(*coordinates)
         slopes = plane.dot.new_tensor(shared_slopes(self.nodes), dtype=torch.float64)
-        found = mean_images(
+        images = mean_images(
             plane,
             cos_slope=slopes.cos().to(plane.dot.dtype),
             tan_slope=slopes.tan().to(plane.dot.dtype),
@@ -59,7 +73,7 @@ class SharedSlopes(CltcSampled, ImageBRDF):
             graded=self.graded,
             modes=self._modes(plane.dot),
         )
-        return found.flat()
+        return images.flat()
 
     def component_coefficients(self) -> dict[str, Tensor]:
         weights = self.slope_weights()
@@ -100,9 +114,12 @@ class RoughSurface(SharedSlopes):
         order 5, most at retro-reflection from steep slopes. Three and more bounces at rho = 1 err by 1e-5 of the whole
         (sigma = 0.3) to 1.5e-3 (sigma = 1) at 4 modes, 1e-7 to 5e-5 at 12. The light returned at rho = 1 exceeds 1 by
         3e-3 at order 4 for sigma = 0.9, by 1e-4 at order 16. Below the node spacing some weights are negative (to
-        -0.8): the sum is accurate, the weights are no distribution; sample slopes with `sample_slope`. Kinks: at
+        -0.8): the sum is accurate, the weights are no distribution; sample slopes with `sample_slope`. Beyond 85 deg
+        such a sum may turn negative: sigma = 0.01 at 89.9, 89.9, 180 deg gives -0.107 /sr at the default nodes, where
+        the integral is 0.0265. Kinks: at
         light = view the zero subgradient is chosen; fractional powers where tan(theta) tan(theta_k) = 1.
-    Source: Oren & Nayar 1994 (long version), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+        (1995, DOI 10.1007/BF01679684), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -133,6 +150,26 @@ class RoughSurface(SharedSlopes):
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
 
+    def members(self) -> list[Member]:
+        """The ladder up to this model: fewer bounces, and of each number fewer slopes."""
+        material: dict[str, Any] = {name: kept(self, name) for name in ("albedo", "sigma")}
+        settings: dict[str, Any] = {"order": self.order, "graded": self.graded, "modes": self.modes}
+        one = self.bounces == 1
+        members = (OrenNayar(**material, interreflection=False) if one else FastRoughSurface(**material)).members()
+        for bounces, (label, extra) in _BOUNCES.items():
+            simulates = (effects.ROUGHNESS, *extra, effects.C3_TERM, effects.EXACT_SLOPES)
+            for nodes in (*(count for count in _COARSER if count < self.nodes), self.nodes):
+                own = nodes == self.nodes
+                model = RoughSurface(**material, **settings, nodes=nodes, bounces=bounces)
+                names = (*simulates, effects.MANY_SLOPES) if own else simulates
+                members.append(Member(f"exact, K = {nodes}, {label}", names, model))
+            if bounces == self.bounces:
+                break
+        return [*members[:-1], members[-1]._replace(model=self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())
+
 
 @final
 class TabulatedRoughSurface(SharedSlopes):
@@ -148,7 +185,7 @@ class TabulatedRoughSurface(SharedSlopes):
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError for weights that are no shares, and as `RoughSurface`.
     Deviations: a distribution narrower than the distance of neighbouring slopes is not resolved.
-    Source: as `RoughSurface`, eq. (25) with any distribution.
+    Source: Oren & Nayar 1994, long version (as `RoughSurface`), eq. (25) with any distribution.
     """
 
     albedo: Constrained = Constrained(ALBEDO)
@@ -185,7 +222,7 @@ class TabulatedRoughSurface(SharedSlopes):
 
 @final
 class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
-    """Gaussian slopes over the paper's closed forms of one slope: (45) direct, (49) two bounces.
+    """Gaussian slopes over closed forms of one slope: Oren & Nayar 1994, eqs. (45) direct, (49) two bounces.
 
     Args:
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
@@ -194,9 +231,9 @@ class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
     Components: direct, two_bounce.
     Raises: ValueError outside the domains or for nodes < 3.
     Deviations: the closed forms are exact for direct light in and across the plane of incidence and interpolated
-        between, and (48) approximates the exchange. From the exact model with all bounces: 4.3 % rms, 20 % at worst
-        (up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/03_accuracy_vs_time.py`).
-    Source: Oren & Nayar 1994 (long version), eqs. (24), (25), (45), (49).
+        between, and eq. (48) approximates the exchange. From the exact model with all bounces: 4.3 % rms, 20 % at worst
+        (up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/benchmarks/ladder.py`).
+    Source: Oren & Nayar 1994, long version (as `RoughSurface`), eqs. (24), (25), (45), (48), (49).
     """
 
     albedo: Constrained = Constrained(ALBEDO)

@@ -61,7 +61,8 @@ class SingleSlopeVCavities(_OneSlope):
     Raises: ValueError outside the domains, and for all bounces with a trained slope (their modes have no derivative).
     Deviations: none in direct light (2e-14 of adaptive quadrature). Zero subgradient at light = view. The modes of
         three and more bounces are looked up by the number that the slope is, which breaks the graph of torch.compile.
-    Source: Oren & Nayar 1994 (long version), section 4.2, eqs. (23), (19), (46); azimuth means: own derivation.
+    Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
+        (1995, DOI 10.1007/BF01679684), section 4.2, eqs. (23), (19), (46); azimuth means: own derivation.
     """
 
     def __init__(
@@ -99,7 +100,7 @@ class SingleSlopeVCavities(_OneSlope):
 
 @final
 class ClosedFormVCavities(_OneSlope):
-    """Isotropic V-cavities of one slope angle in the paper's closed forms: (45) direct, (49) two bounces.
+    """Isotropic V-cavities of one slope angle in closed form: Oren & Nayar 1994, eqs. (45) direct, (49) two bounces.
 
     Args:
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
@@ -107,8 +108,8 @@ class ClosedFormVCavities(_OneSlope):
     Components: direct, two_bounce.
     Raises: ValueError outside the domains.
     Deviations: direct light is exact at relative azimuths 0, 90 and 180 deg and interpolated between, up to
-        0.34 /sr off at 45 deg (grazing, steep slopes); (48) approximates the exchange.
-    Source: Oren & Nayar 1994 (long version), eqs. (24)/(45), (49).
+        0.34 /sr off at 45 deg (grazing, steep slopes); eq. (48) of the same paper approximates the exchange.
+    Source: Oren & Nayar 1994, long version (as `SingleSlopeVCavities`), eqs. (24), (45), (49).
     """
 
     def __init__(self, *, albedo: Tensor | float | fixed = 0.5, slope: Tensor | float | fixed = 0.5):
@@ -134,7 +135,8 @@ class UnidirectionalVCavities(_OneSlope):
         f_r = \tfrac12 [f(u) + f(-u)], \quad
         f(u) = \frac{\cos\theta_a}{\pi} [\rho \min(X_+ Y_+, 2 X_+, 2 Y_+) + \rho^2 X'_+ Y_+ IF/\pi]
 
-    with X = 1 + u.p, X' = 1 - u.p, Y = 1 + u.q in the slope plane and IF the exact exchange (19).
+    with X = 1 + u.p, X' = 1 - u.p, Y = 1 + u.q in the slope plane and IF the exact exchange of
+    Oren & Nayar 1994, eq. (19).
 
     Args:
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
@@ -145,7 +147,7 @@ class UnidirectionalVCavities(_OneSlope):
     Raises: ValueError outside the domains, without a tangent, and for all bounces with a trained slope.
     Deviations: none for two bounces; the BRDF itself has kinks where a facet starts to be cut. With all bounces the
         graph of torch.compile breaks, as in `SingleSlopeVCavities`.
-    Source: Oren & Nayar 1994 (long version), section 4.1, eqs. (19), (22), (38) repaired.
+    Source: Oren & Nayar 1994, long version (as `SingleSlopeVCavities`), section 4.1, eqs. (19), (22), (38) repaired.
     """
 
     anisotropic = True

@@ -18,7 +18,6 @@ import torchbrdf as tb
 from inverse import FitResult, Measurements, fit_measurements, read_gonioreflectometer, weighted_reflectance
 from inverse.figures import measurement_figure
 
-CORNELL = Path("../shared/data/cornell_brdf")
 BANDS = {"blue": (400, 490), "green": (500, 590), "red": (600, 700)}  # [nm]
 KNEE = 0.01  # [1/sr]
 DRAWN = ("Lambert", "MaxCosinePhong", "Lambert + GGX")
@@ -156,7 +155,7 @@ def in_plane(paint: Paint, models: dict[str, tb.BRDF]) -> tuple[str, dict[str, t
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, nargs="?", default=CORNELL, help="of the .brdf files")
+    parser.add_argument("folder", type=Path, help="of the .brdf files")
     parser.add_argument("--output", type=Path, default=Path("output"), help="folder of the figure")
     parser.add_argument("--models", nargs="+", default=[*DIFFUSE, *MIXTURES], help="which to fit")
     parser.add_argument("--paints", type=int, default=5, help="how many")
@@ -188,7 +187,7 @@ def main() -> None:
         name: {f"{paint}\n{part}": three[k] for paint, three in row.items() for k, part in enumerate(parts)}
         for name, row in shares.items()
     }
-    measurement_figure(path, curves, table)
+    measurement_figure(curves, table).savefig(path)
     print(f"Figure: {path}")
 
 

@@ -1,4 +1,4 @@
-r"""The two parts of the first-surface reflection without their Fresnel factor: coherent (specular) and diffracted.
+r"""The two parts of the first-surface reflection without their Fresnel factor: specular and directional diffuse.
 
 All lengths in one unit. h = light + view is not normalised, k = 2 pi/lambda,
 
@@ -13,7 +13,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import cross, dot, safe_sqrt
+from torchbrdf._numerics import cross, dot, safe_divide, safe_sqrt
 from torchbrdf.directions import Cosines
 from torchbrdf.facets import HalfVector
 from torchbrdf.models.he_torrance.roughness import effective_roughness
@@ -22,7 +22,7 @@ from torchbrdf.models.he_torrance.shadowing import shadowing
 
 
 class Geometry(NamedTuple):
-    """What the lobe reads of the directions, each (..., 1), broadcast with (channel,). [-]
+    """What the directional-diffuse part reads of the directions, each (..., 1), broadcast with (channel,). [-]
 
     Attributes:
         cos_light, sin_light, cos_view, sin_view: of the polar angles.
@@ -61,15 +61,15 @@ def _sine(cosines: Cosines, which: str) -> Tensor:
     return safe_sqrt(dot(across, across).masked_fill(~cosines.above_horizon, 0.0))
 
 
-def diffracted(geometry: Geometry, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
-    r"""Directional-diffuse lobe of a perfect reflector (..., channel). [1/sr]
+def directional_diffuse_of_waves(geometry: Geometry, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
+    r"""Directional-diffuse part of a perfect reflector (..., channel). [1/sr]
 
     .. math::
         \frac{G S D}{\pi c_i c_r} = \frac{|h|^4}{\pi} \Big(\frac{\pi^2 \sigma \tau}{\lambda^2}\Big)^2
         \frac{S(g, t)}{g}\, \frac{S_1(\theta_i)}{c_i} \frac{S_1(\theta_r)}{c_r}
 
-    with G = |h|^4/h_z^2 and D of (76), (78). In this order of factors nothing overflows at grazing, in
-    retro-reflection or at normal incidence.
+    with G = |h|^4/h_z^2 and D of He et al. 1991, eqs. (76), (78). In this order of factors nothing overflows at
+    grazing, in retro-reflection or at normal incidence.
 
     Args: sigma0, tau (..., 1), wavelength (channel,), one unit of length.
     """
@@ -84,7 +84,28 @@ def diffracted(geometry: Geometry, *, sigma0: Tensor, tau: Tensor, wavelength: T
     return strength * strength * series_over_g(g, t) * light.over_cos * view.over_cos / math.pi
 
 
-def coherent(cos: Tensor, sin: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
+def directional_diffuse_of_facets(geometry: Geometry, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
+    r"""Its limit of geometric optics, g -> infinity (..., channel): mirror facets. [1/sr]
+
+    .. math::
+        \frac{1}{\pi} \Big(\frac{\tau |h|^2}{4 \sigma h_z^2}\Big)^2 e^{-(\tau/2\sigma)^2 |h_{xy}|^2/h_z^2}\,
+        \frac{S_1(\theta_i)}{c_i} \frac{S_1(\theta_r)}{c_r}
+
+    Beckmann's distribution of width 2 sigma/tau, from S(g, t) -> exp(-t/g)/g; the error is that of the first term left
+    out, (1 - 2 t/g + (t/g)^2/2)/g. Of the wavelength only the shape is read. 0 for a surface without height.
+    """
+    light = shadowing(geometry.cos_light, geometry.sin_light, sigma0=sigma0, tau=tau)
+    view = shadowing(geometry.cos_view, geometry.sin_view, sigma0=sigma0, tau=tau)
+    height = 2 * sigma0 * effective_roughness(light.k + view.k) * (geometry.cos_light + geometry.cos_view)
+    steepness = safe_divide(tau.expand_as(height), height, where=height > 0)  # of facets of slope 1, over their spread
+    up = geometry.cos_light + geometry.cos_view
+    strength = safe_divide(steepness * geometry.squared, 2 * up, where=(up > 0).expand_as(steepness))
+    spread = (-steepness * steepness * geometry.planar).exp()
+    f = strength * strength * spread * light.over_cos * view.over_cos / math.pi
+    return f + torch.zeros_like(wavelength)
+
+
+def specular_share(cos: Tensor, sin: Tensor, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:
     r"""Share :math:`e^{-g} S` of the light that a perfect reflector sends in the mirror direction (..., channel). [-]
 
     Args: cos, sin of incidence (..., 1); sigma0, tau (..., 1), wavelength (channel,), one unit of length.

@@ -10,7 +10,7 @@ import torch
 from PIL import Image
 from png_files import png_bytes
 
-from inverse.files.stacks import read_image, write_image
+from inverse import read_image, write_image
 
 GRAY_SPHERE = Path(__file__).parents[3] / "shared" / "data" / "gray_sphere"
 

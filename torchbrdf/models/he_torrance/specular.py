@@ -1,4 +1,4 @@
-r"""The specular part averaged over a finite source and a finite detector: a spike of finite height.
+r"""The specular part averaged over a finite source and a finite detector: finite, about the mirror direction.
 
 Light from a cone of solid angle dw about a direction is mirrored into an equal cone; a detector accepts another. What
 it measures is the share of the two that overlaps. With cones of half-angle alpha, an angle gamma between the detector
@@ -19,8 +19,8 @@ from torch import Tensor
 
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines
-from torchbrdf.models.he_torrance.lobe import Geometry
-from torchbrdf.models.he_torrance.reflectance import mirror_reflectance
+from torchbrdf.models.he_torrance.perfect_reflector import Geometry
+from torchbrdf.models.he_torrance.reflectance import unchecked_specular_reflectivity
 from torchbrdf.quadrature import gauss_legendre
 
 # Solid angles of cones: from one that float32 cannot tell from a delta lobe to a quarter of the hemisphere. [sr]
@@ -53,7 +53,7 @@ def cone_overlap(half_sine_squared: Tensor, solid_angle: float) -> Tensor:
     return share.masked_fill(apart, 0.0)
 
 
-def averaged_spike(
+def averaged_specular(
     cosines: Cosines,
     *,
     solid_angle: float,
@@ -75,10 +75,10 @@ def averaged_spike(
     # the chord between view and mirrored light, over 2, squared
     half_sine_squared = (geometry.planar + difference * difference) / 4
     surface = {"sigma0": sigma0, "tau": tau, "wavelength": wavelength, "eta": eta, "k": k}
-    return _spike(geometry.cos_light + geometry.cos_view, half_sine_squared, solid_angle, surface)
+    return _averaged(geometry.cos_light + geometry.cos_view, half_sine_squared, solid_angle, surface)
 
 
-def spike_albedo(
+def averaged_specular_albedo(
     cos_view: Tensor,
     *,
     solid_angle: float,
@@ -89,7 +89,7 @@ def spike_albedo(
     k: Tensor,
     nodes: int,
 ) -> Tensor:
-    """Share of light from `cos_view` (...) that the averaged spike returns above the horizon (..., channel). [-]
+    """Share of light from `cos_view` (...) that `averaged_specular` returns above the horizon (..., channel). [-]
 
     `nodes` angles from the mirror direction times as many azimuths, each up to the rim or to the horizon.
     """
@@ -105,14 +105,14 @@ def spike_albedo(
     gamma = end * x
     cos_light = c * gamma.cos() - downward * gamma.sin()
     surface = {"sigma0": sigma0, "tau": tau, "wavelength": wavelength, "eta": eta, "k": k}
-    f = _spike(c + cos_light, (gamma / 2).sin() ** 2, solid_angle, surface)
+    f = _averaged(c + cos_light, (gamma / 2).sin() ** 2, solid_angle, surface)
     return (f * (cos_light * gamma.sin() * end * weight * phi_weight)).sum((0, 1))
 
 
-def _spike(up: Tensor, half_sine_squared: Tensor, solid_angle: float, surface: dict[str, Tensor]) -> Tensor:
-    """The averaged spike from the sum of the cosines and from sin^2(gamma/2), each (..., 1)."""
+def _averaged(up: Tensor, half_sine_squared: Tensor, solid_angle: float, surface: dict[str, Tensor]) -> Tensor:
+    """The averaged specular part from the sum of the cosines and from sin^2(gamma/2), each (..., 1)."""
     share = cone_overlap(half_sine_squared, solid_angle)
     near = share > 0
     halfway = up / 2 / (1 - half_sine_squared.masked_fill(~near, 0.0)).sqrt()
     middle = torch.where(near, halfway, torch.ones_like(up))
-    return mirror_reflectance(middle[..., 0], **surface) * (share / (middle * solid_angle))
+    return unchecked_specular_reflectivity(middle[..., 0], **surface) * (share / (middle * solid_angle))

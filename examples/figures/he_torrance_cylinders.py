@@ -8,17 +8,15 @@ import argparse
 import math
 from pathlib import Path
 
-import matplotlib
-import matplotlib.pyplot as plt
 import torch
 from kornia.color import linear_rgb_to_rgb
 from kornia.geometry.camera import PinholeCamera
+from matplotlib.figure import Figure
 from torch import Tensor
 
 from inverse import Cylinder, Environment, Scene, Surface, perspective, pinhole, render
 from torchbrdf import ALUMINIUM, HeTorrance, fixed
 
-matplotlib.use("Agg")
 WAVELENGTHS = torch.tensor([0.65, 0.55, 0.45])  # red, green, blue [um]
 ETA, K = ALUMINIUM(WAVELENGTHS)
 ROUGHNESS = ((0.18, 3.0), (0.28, 3.0), (0.38, 3.0), (0.48, 3.0), (0.58, 3.0), (2.5, 16.0))
@@ -78,15 +76,15 @@ def main() -> None:
     shown = {f"sigma0 {sigma0}, tau {tau:g}": aluminium(sigma0, tau) for sigma0, tau in ROUGHNESS}
     shown["sigma0 0"] = aluminium(0.0, 3.0, directional_diffuse=False)
     shown["uniform diffuse alone"] = aluminium(0.0, 3.0, diffuse=fixed(0.9), specular=False, directional_diffuse=False)
-    figure, axes = plt.subplots(2, 4, figsize=(9.6, 6.1), layout="constrained")
+    figure = Figure(figsize=(9.6, 6.1), dpi=90, layout="constrained")
+    axes = figure.subplots(2, 4)
     for axis, (title, model) in zip(axes.flat, shown.items(), strict=True):
         axis.imshow(picture(scene if model.sigma0 == 0 else coarse, model).numpy())
-        axis.set_title(title, fontsize=11)
+        axis.set_title(f"{title} um" if "tau" in title else title, fontsize=11)
         axis.set_axis_off()
         print(title, flush=True)
     path = args.output / "he_torrance_cylinders.png"
-    figure.savefig(path, dpi=90)
-    plt.close(figure)
+    figure.savefig(path)
     print(f"Picture: {path}")
 
 

@@ -1,0 +1,81 @@
+"""One image on disk: PNG, TGA and TIFF as tensors in [0, 1], and PNG back."""
+
+from pathlib import Path
+
+import kornia_rs
+import numpy as np
+import torch
+from kornia.color import rgb_to_linear_rgb
+from PIL import Image
+from tifffile import TiffFile, TiffPage
+from torch import Tensor
+
+SUFFIXES = (".png", ".tga", ".tif", ".tiff")
+
+
+def read_image(path: str | Path, color: str = "linear") -> Tensor:
+    """PNG, TGA or TIFF of 8 or 16 bits (TIFF also float) as (rows, columns, 1 or 3) in [0, 1], float32, linear light.
+
+    The file encodes light as `color`, "linear" or "srgb". OSError: unreadable; ValueError: no such image.
+    """
+    if color not in ("linear", "srgb"):
+        raise ValueError(f'color must be "linear" or "srgb"; found {color!r}.')
+    path = Path(path)
+    try:
+        data, bits = _decoded(path)
+    except Exception as error:  # each reader raises what it likes, kornia_rs bare Exception
+        raise OSError(f"{path}: cannot be read: {error}") from error
+    if data.dtype.itemsize * 8 < bits:
+        raise ValueError(f"{path}: the file has {bits} bits, but its reader delivered {data.dtype.itemsize * 8}.")
+    if data.dtype.kind not in "uf" or data.ndim not in (2, 3) or (data.ndim == 3 and data.shape[2] > 4):
+        raise ValueError(f"{path}: must be one grey or RGB image; found {data.dtype} {data.shape}.")
+    scale = np.iinfo(data.dtype).max if data.dtype.kind == "u" else 1.0
+    image = torch.from_numpy(data.astype(np.float64) / scale).float().reshape(*data.shape[:2], -1)
+    image = image[..., : 1 if image.shape[-1] < 3 else 3]  # drops alpha
+    broken = ~((image >= 0) & (image <= 1))  # so that NaN counts
+    if broken.any():
+        raise ValueError(f"{path}: pixels must be finite, in [0, 1]; {int(broken.sum())} of {broken.numel()} are not.")
+    if color == "linear":
+        return image
+    linear = rgb_to_linear_rgb(image.movedim(-1, 0).expand(3, -1, -1)).movedim(0, -1)
+    return linear[..., : image.shape[-1]].contiguous()
+
+
+def write_image(path: str | Path, image: Tensor, bits: int = 16) -> None:
+    """Write (rows, columns, 1 or 3) in [0, 1] as PNG of 8 or 16 bits; the values are stored as they are."""
+    if bits not in (8, 16) or image.ndim != 3 or image.shape[-1] not in (1, 3):
+        rule = "an image is (rows, columns, 1 or 3) of 8 or 16 bits"
+        raise ValueError(f"{path}: {rule}; found {tuple(image.shape)} and {bits} bits.")
+    outside = ~((image >= 0) & (image <= 1))  # so that NaN counts
+    if outside.any():
+        raise ValueError(f"{path}: pixels must lie in [0, 1]; {int(outside.sum())} of {outside.numel()} do not.")
+    levels = (image.detach().cpu().double() * (2**bits - 1)).round().numpy()
+    data = np.ascontiguousarray(levels, dtype=np.uint16 if bits == 16 else np.uint8)
+    write = kornia_rs.io.write_image_png_u16 if bits == 16 else kornia_rs.io.write_image_png_u8
+    try:
+        write(str(path), data, "rgb" if image.shape[-1] == 3 else "mono")
+    except Exception as error:  # kornia_rs raises bare Exception
+        raise OSError(f"{path}: cannot be written: {error}") from error
+
+
+def _decoded(path: Path) -> tuple[np.ndarray, int]:
+    """Pixels as stored, and the bits a sample the header declares. No one reader is right for all files."""
+    suffix = path.suffix.lower()
+    if suffix in (".tif", ".tiff"):
+        with TiffFile(path) as file:
+            page = file.pages[0]
+            if len(file.pages) != 1 or not isinstance(page, TiffPage) or page.photometric not in (1, 2):
+                raise ValueError("a TIFF must hold one image, grey (black is 0) or RGB.")
+            try:
+                return page.asarray(), page.bitspersample
+            except (ValueError, KeyError):  # a codec that tifffile lacks and kornia has, such as LZW
+                if page.planarconfig != 1:  # kornia would scramble the planes
+                    raise
+                return kornia_rs.io.read_image(str(path)), page.bitspersample
+    if suffix not in SUFFIXES:
+        raise ValueError(f"must be one of {' '.join(SUFFIXES)}.")
+    header = path.read_bytes()[:25]
+    if header[:8] == b"\x89PNG\r\n\x1a\n" and header[24:] == b"\x10":  # 16 bits, of which PIL would keep 8
+        return kornia_rs.io.read_image(str(path)), 16
+    with Image.open(path) as image:
+        return np.asarray(image if image.mode in ("L", "LA", "RGB", "RGBA") else image.convert("RGB")), 8

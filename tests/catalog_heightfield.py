@@ -1,0 +1,51 @@
+"""The rows of the random heightfields."""
+
+from materials import Model, colour, number
+
+from torchbrdf import GaussianHeightfield, fixed
+
+# The masking of two rays has a kink where they coincide, which no panel's end follows off the plane of the view.
+CONE = 5e-5
+# The nodes of the slopes move with the directions: a value is a sum of some hundred that were rounded apart.
+ROUNDED = 1e-5
+
+HEIGHTFIELD = [
+    Model(
+        "gaussian heightfield, direct",
+        lambda dtype: GaussianHeightfield(albedo=colour(dtype), sigma=number(0.5, dtype), nodes=160, bounces=1),
+        integral=CONE,
+        float32=ROUNDED,
+    ),
+    Model(
+        "gaussian heightfield",
+        lambda dtype: GaussianHeightfield(
+            albedo=colour(dtype),
+            sigma=number(0.5, dtype),
+            occlusion=number(0.8, dtype),
+            nodes=160,
+            polar_nodes=5,
+            table_orders=3,
+        ),
+        captured=False,
+        integral=CONE,
+        float32=ROUNDED,
+    ),
+    Model(
+        "gaussian heightfield, white",
+        lambda dtype: GaussianHeightfield(
+            albedo=fixed(number(1.0, dtype)), sigma=fixed(number(0.9, dtype)), nodes=160, bounces="all"
+        ),
+        energy_limit=1.001,
+        reason="balanced at the nodes of the table: up to 1.0005 between them",
+        captured=False,
+        integral=CONE,
+        float32=ROUNDED,
+    ),
+    Model(
+        "gaussian heightfield, fixed sigma = 0",
+        lambda dtype: GaussianHeightfield(
+            albedo=colour(dtype), sigma=fixed(number(0.0, dtype)), nodes=160, polar_nodes=4, table_orders=2
+        ),
+        captured=False,
+    ),
+]

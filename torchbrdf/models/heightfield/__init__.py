@@ -1,0 +1,1 @@
+"""Random heightfields with Gaussian slopes: sand, plaster, cast and sintered surfaces."""

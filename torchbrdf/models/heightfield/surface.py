@@ -1,0 +1,195 @@
+"""The reference for random rough surfaces: a Lambertian Gaussian heightfield, its direct light and its bounces."""
+
+from typing import Literal, NamedTuple, final
+
+import torch
+from torch import Tensor
+
+from torchbrdf.brdf import BRDF
+from torchbrdf.directions import Cosines
+from torchbrdf.models.heightfield.direct import QUADRATURES, direct_light, slope_frame
+from torchbrdf.models.heightfield.roughness import RMS_SLOPE, rms_slope_from_sigma, sigma_from_rms_slope
+from torchbrdf.models.heightfield.table import TableSize, bounce_table, read_table
+from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Interval, fixed
+from torchbrdf.sampling import CltcSampled, equivalent_roughness
+
+BounceCount = int | Literal["all"]
+# Beyond 1 the masking dips below 0: more facets would be seen than there are. It is -1e-5 at 1.2, -5e-3 at 1.6.
+OCCLUSION = Interval(0.0, 1.2)
+
+
+class Settings(NamedTuple):
+    """How much is computed; see `GaussianHeightfield`."""
+
+    bounces: BounceCount
+    nodes: int
+    size: TableSize
+    constants: HeightfieldConstants
+
+    @property
+    def orders(self) -> int:
+        """Bounces followed beyond the first."""
+        return self.size.orders if self.bounces == "all" else self.bounces - 1
+
+    def check(self, name: str) -> None:
+        """Raise ValueError unless the numbers make sense."""
+        if self.nodes not in QUADRATURES:
+            offered = ", ".join(map(str, QUADRATURES))
+            raise ValueError(f"{name}: nodes must be one of {offered}; found {self.nodes!r}.")
+        if min(self.size) < 2:
+            raise ValueError(f"{name}: polar_nodes and table_orders must be at least 2; found {tuple(self.size)}.")
+        most = self.size.orders + 1
+        whole = isinstance(self.bounces, int) and not isinstance(self.bounces, bool) and 1 <= self.bounces <= most
+        if not whole and self.bounces != "all":
+            raise ValueError(f'{name}: bounces must be 1 to {most} or "all"; found {self.bounces!r}.')
+
+
+def gaussian_heightfield(
+    cosines: Cosines,
+    *,
+    albedo: Tensor,
+    sigma: Tensor,
+    occlusion: Tensor,
+    bounces: BounceCount = "all",
+    nodes: int = 240,
+    polar_nodes: int = 14,
+    table_orders: int = 24,
+    constants: HeightfieldConstants = SMOOTH_HEIGHTFIELD,
+) -> Tensor:
+    r"""Reflectance of a random heightfield with Gaussian slopes and Lambertian facets.
+
+    .. math::
+        f_r &= \rho f_1 + \rho^2 f_2 + \dots, \quad
+        f_1 = \frac1\pi\, E_\xi \Bigl[\frac{\cos_a\, X^+ Y^+}{1 + D}\Bigr] \\
+        X &= 1 + t_i\, \xi \cdot d_i,\quad Y = 1 + t_r\, \xi \cdot d_r,\quad t = s \tan\theta,\quad
+        \cos_a = (1 + s^2 |\xi|^2)^{-1/2}
+
+    over slopes s xi, xi ~ N(0, I). Every facet has its own chance 1/(1 + D) of being seen and lit (`visibility.py`):
+    Smith's, corrected for the surface near by, which hides facets that are nearly edge-on. Light reflected more often
+    follows Smith's surface as a half-space (`transport.py`), balanced so that white facets lose nothing.
+
+    Args:
+        cosines: of light, view and phase angle, each (...). `Cosines.of(normal, light, view)` makes them.
+        albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
+        sigma: roughness, scalar or (...). [rad] in [0, pi/2]; 0 is Lambert exactly. `rms_slope_from_sigma` says
+            what rms slope s it stands for.
+        occlusion: E, how much the surface near by hides, scalar or (...). [-] in [0, 1.2]; 0 is Smith's surface with
+            correlated heights, 1 a surface of one smooth scale.
+        bounces: 1, 2, .. or "all", which is table_orders + 1.
+        nodes: slopes of the direct light: 160, 240, 384 or 560.
+        polar_nodes, table_orders: size of the table of bounces.
+        constants: constants of the visibility.
+    Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
+    Raises: ValueError outside the domains, or for other nodes or bounces.
+    Source: own; see `docs/heightfield.md` for what it is built on.
+    """
+    ALBEDO.check("gaussian_heightfield: albedo", albedo)
+    ROUGHNESS.check("gaussian_heightfield: sigma", sigma)
+    OCCLUSION.check("gaussian_heightfield: occlusion", occlusion)
+    settings = Settings(bounces, nodes, TableSize(polar_nodes, table_orders), constants)
+    settings.check("gaussian_heightfield")
+    fields = heightfield_fields(cosines, sigma, occlusion, settings)
+    return cosines.zero_below_horizon(sum_of_orders(albedo, fields))
+
+
+def heightfield_fields(cosines: Cosines, sigma: Tensor, occlusion: Tensor, settings: Settings) -> Tensor:
+    """f_1, f_2, .. (..., bounces) [1/sr]; finite below the horizon."""
+    quadrature = QUADRATURES[settings.nodes]
+    slope = rms_slope_from_sigma(sigma)
+    direct = direct_light(slope_frame(cosines, slope), occlusion, settings.constants, quadrature)[..., None]
+    if settings.orders == 0:
+        return direct
+    table = bounce_table(sigma, occlusion, settings.constants, quadrature, settings.size)
+    bounced = read_table(cosines, table, settings.size)[..., : settings.orders]
+    return torch.cat((direct, bounced.expand(*direct.shape[:-1], settings.orders)), -1)
+
+
+def sum_of_orders(albedo: Tensor, fields: Tensor, first: int = 1) -> Tensor:
+    """sum_n rho^n fields_n (..., channel), n from `first` on, for rho () , (channel,) or (..., channel)."""
+    rho = torch.atleast_1d(albedo)
+    total = torch.zeros_like(rho)
+    for field in reversed(fields.unbind(-1)):
+        total = rho * total + field[..., None]
+    return rho**first * total
+
+
+@final
+class GaussianHeightfield(CltcSampled, BRDF):
+    """Random heightfield as a module: the reference; see `gaussian_heightfield` for equation and units.
+
+    Args:
+        albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-]
+        sigma: roughness, scalar or (...). [rad] `from_rms_slope` takes the rms slope instead.
+        occlusion: E, scalar or (...). [-] in [0, 1.2]; held at 1 unless given.
+        bounces, nodes, polar_nodes, table_orders, constants: as in `gaussian_heightfield`.
+    Components: direct, two_bounce, higher (those followed).
+    Raises: ValueError outside the domains, or for other nodes or bounces.
+    """
+
+    albedo: Constrained = Constrained(ALBEDO)
+    sigma: Constrained = Constrained(ROUGHNESS)
+    occlusion: Constrained = Constrained(OCCLUSION)
+
+    def __init__(
+        self,
+        *,
+        albedo: Tensor | float | fixed = 0.5,
+        sigma: Tensor | float | fixed = 0.3,
+        occlusion: Tensor | float | fixed = fixed(1.0),  # noqa: B008 - frozen
+        bounces: BounceCount = "all",
+        nodes: int = 240,
+        polar_nodes: int = 14,
+        table_orders: int = 24,
+        constants: HeightfieldConstants = SMOOTH_HEIGHTFIELD,
+    ):
+        super().__init__()
+        self.settings = Settings(bounces, nodes, TableSize(polar_nodes, table_orders), constants)
+        self.settings.check("GaussianHeightfield")
+        self.albedo = albedo
+        self.sigma = sigma
+        self.occlusion = occlusion
+
+    @classmethod
+    def from_rms_slope(
+        cls,
+        rms_slope: Tensor | float | fixed,
+        *,
+        albedo: Tensor | float | fixed = 0.5,
+        occlusion: Tensor | float | fixed = fixed(1.0),  # noqa: B008 - frozen
+        bounces: BounceCount = "all",
+        nodes: int = 240,
+        polar_nodes: int = 14,
+        table_orders: int = 24,
+        constants: HeightfieldConstants = SMOOTH_HEIGHTFIELD,
+    ) -> "GaussianHeightfield":
+        """Of rms slope s per axis [-] in [0, 1.482], scalar or (...), as a profilometer measures it."""
+        given = torch.as_tensor(rms_slope.value if isinstance(rms_slope, fixed) else rms_slope)
+        RMS_SLOPE.check("GaussianHeightfield.from_rms_slope: rms_slope", given)
+        sigma = sigma_from_rms_slope(given)
+        return cls(
+            albedo=albedo,
+            sigma=fixed(sigma) if isinstance(rms_slope, fixed) else sigma,
+            occlusion=occlusion,
+            bounces=bounces,
+            nodes=nodes,
+            polar_nodes=polar_nodes,
+            table_orders=table_orders,
+            constants=constants,
+        )
+
+    def sampling_roughness(self) -> Tensor:
+        return equivalent_roughness(self.sigma)
+
+    def fields(self, cosines: Cosines) -> Tensor:
+        """f_1, f_2, .. of unit albedo (..., bounces) [1/sr]; finite below the horizon."""
+        return heightfield_fields(cosines, self.sigma, self.occlusion, self.settings)
+
+    def evaluate(self, cosines: Cosines) -> Tensor:
+        return cosines.zero_below_horizon(sum_of_orders(self.albedo, self.fields(cosines)))
+
+    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
+        fields = self.fields(cosines)
+        slices = {"direct": slice(0, 1), "two_bounce": slice(1, 2), "higher": slice(2, None)}
+        parts = {name: (fields[..., part], 1 + (part.start or 0)) for name, part in slices.items()}
+        return {name: sum_of_orders(self.albedo, f, first) for name, (f, first) in parts.items() if f.shape[-1]}

@@ -1,0 +1,118 @@
+"""The bounces of a surface as a table: a polynomial in the two polar angles for each order, read at any pixel.
+
+A table belongs to one roughness and one occlusion. It is kept for the last few materials that are plain numbers, and
+made anew where its derivatives are asked for.
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.autograd import forward_ad
+
+from torchbrdf._numerics import angle_over_sine, safe_sqrt
+from torchbrdf.directions import Cosines
+from torchbrdf.models.heightfield.direct import Quadrature
+from torchbrdf.models.heightfield.roughness import rms_slope_from_sigma
+from torchbrdf.models.heightfield.transport import bounce_modes, polar_nodes
+from torchbrdf.models.heightfield.visibility import HeightfieldConstants
+from torchbrdf.quadrature import gauss_legendre
+
+_PIXELS_AT_A_TIME = 1024
+
+
+class TableSize(NamedTuple):
+    """Nodes of each polar angle, and bounces followed beyond the first."""
+
+    polar: int
+    orders: int
+
+
+def bounce_table(
+    sigma: Tensor, occlusion: Tensor, constants: HeightfieldConstants, quadrature: Quadrature, size: TableSize
+) -> Tensor:
+    """Legendre coefficients (..., polar^2, 2 orders) in float64 of F_0 and 2 F_1/(sin_i sin_r), n = 2 .. orders + 1.
+
+    Args:
+        sigma, occlusion: roughness [rad] and E; of more than one entry, each has a table of its own.
+    """
+    numbers = _plain(sigma), _plain(occlusion)
+    if numbers[0] is None or numbers[1] is None:
+        return _table(sigma.double(), occlusion.double(), constants, quadrature, size)
+    return _kept_table(numbers[0], numbers[1], constants, quadrature, size).to(sigma.device)
+
+
+def _plain(value: Tensor) -> float | None:
+    """The number in a tensor that holds one and whose derivatives are not asked for, else None."""
+    if torch.compiler.is_compiling() or value.numel() != 1 or (value.requires_grad and torch.is_grad_enabled()):
+        return None
+    if forward_ad.unpack_dual(value).tangent is not None:
+        return None
+    try:
+        return value.item()
+    except RuntimeError:  # a batched tensor inside torch.func.vmap cannot be read
+        return None
+
+
+@lru_cache(maxsize=32)
+def _kept_table(
+    sigma: float, occlusion: float, constants: HeightfieldConstants, quadrature: Quadrature, size: TableSize
+) -> Tensor:
+    with torch.no_grad():
+        first, second = (torch.tensor(value, dtype=torch.float64) for value in (sigma, occlusion))
+        return _table(first, second, constants, quadrature, size)
+
+
+def _table(
+    sigma: Tensor, occlusion: Tensor, constants: HeightfieldConstants, quadrature: Quadrature, size: TableSize
+) -> Tensor:
+    sigma, occlusion = torch.broadcast_tensors(sigma, occlusion)
+    slope = rms_slope_from_sigma(sigma)
+    modes = bounce_modes(slope, occlusion, constants, quadrature, polar=size.polar, orders=size.orders)
+    nodes = polar_nodes(size.polar, slope)
+    # F_1 vanishes with either sine; what is left is smooth at normal incidence, where dphi has no meaning
+    turned = 2 / (nodes.sin[:, None] * nodes.sin)
+    modes = torch.stack((modes[..., 0, :, :], modes[..., 1, :, :] * turned), -4)  # (..., 2, orders, P, P)
+    x, weight = gauss_legendre(size.polar, slope)
+    rows = legendre(2 * x - 1, size.polar)
+    project = rows * weight[:, None] * (2 * torch.arange(size.polar, dtype=x.dtype, device=x.device) + 1)
+    coefficients = project.mT @ modes @ project
+    return coefficients.flatten(-2).flatten(-3, -2).mT
+
+
+def legendre(x: Tensor, count: int) -> Tensor:
+    """P_0 .. P_(count-1) at x (...): (..., count)."""
+    rows = [torch.ones_like(x), x]
+    for n in range(1, count - 1):
+        rows.append(((2 * n + 1) * x * rows[-1] - n * rows[-2]) / (n + 1))
+    return torch.stack(rows[:count], -1)
+
+
+def read_table(cosines: Cosines, table: Tensor, size: TableSize) -> Tensor:
+    """F_n (..., orders) [1/sr] at directions (...), of a table (..., polar^2, 2 orders)."""
+    table = table.to(cosines.light.dtype)
+    shape = torch.broadcast_shapes(cosines.light.shape, table.shape[:-2])
+    fields = torch.stack((cosines.light, cosines.view, cosines.in_plane))
+    if table.ndim > 2 or torch.compiler.is_compiling() or shape.numel() <= _PIXELS_AT_A_TIME:
+        return _read(fields, table, size)
+    pieces = fields.flatten(1).split(_PIXELS_AT_A_TIME, 1)
+    return torch.cat([_read(piece, table, size) for piece in pieces]).unflatten(0, shape)
+
+
+def _read(fields: Tensor, table: Tensor, size: TableSize) -> Tensor:
+    light, view, in_plane = fields
+    light, view = _rows(light, size.polar), _rows(view, size.polar)
+    products = (light[..., :, None] * view[..., None, :]).flatten(-2)
+    if table.ndim == 2:
+        orders = products @ table
+    else:
+        orders = (products[..., None, :] @ table)[..., 0, :]
+    flat, turned = orders.split(size.orders, -1)
+    return flat + in_plane[..., None] * turned
+
+
+def _rows(cosine: Tensor, count: int) -> Tensor:
+    theta = safe_sqrt((1 - cosine) * (1 + cosine)) * angle_over_sine(cosine)
+    return legendre(theta * (4 / math.pi) - 1, count)
