@@ -67,7 +67,7 @@ Components = tuple[Tensor, Tensor, Tensor]
 
 
 def components(vector: Tensor) -> Components:
-    """x, y and z (...) of vectors (..., 3), each in one piece of memory: strided ones cost five times as much to use."""
+    """x, y and z (...) of vectors (..., 3), each in one piece of memory: strided ones take five times as long."""
     x, y, z = vector.unbind(-1)
     return (x.contiguous(), y.contiguous(), z.contiguous()) if vector.is_contiguous() else (x, y, z)
 

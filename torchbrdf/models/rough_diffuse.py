@@ -176,7 +176,9 @@ class EON(_RoughDiffuse):
         return (*super().fields(cosines), r / (math.pi * (1 + C1 * r)) * self._lost(cosines))
 
     def reflected(self, *fields: Tensor) -> Tensor:
-        return super().reflected(*fields) + self._returned() * fields[1]
+        rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness[..., None])
+        direct, returned = fields
+        return rho * (direct + rho * (average * returned) / (1 - rho * (1 - average)))
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return torch.ones_like(cosines.light), retro_term(cosines), self._lost(cosines)
