@@ -113,7 +113,7 @@ def _fit(options: argparse.Namespace) -> dict[str, Any]:
         spread = bootstrap(scene, photos.images, model, samples=options.bootstrap, seed=options.seed, **how)
         report["bootstrap"] = {"samples": options.bootstrap}
         for name, value in spread.items():
-            angle = name.endswith("sigma")
+            angle = name in result.angles
             label, shown = (f"{name}_degrees", torch.rad2deg(value)) if angle else (name, value)
             report["bootstrap"][label] = _plain(shown)
             numbers = ", ".join(f"{k:.2g}" for k in shown.flatten().tolist())

@@ -76,10 +76,10 @@ def residual_figure(scene: Scene, photographs: Tensor, renderings: dict[str, Ten
         axis.set_title(f"minus {label}, rms {rms:.4f}", fontsize=10)
         means = [residual[valid & (angles >= low) & (angles < high)].mean().item() for low, high in pairwise(edges)]
         axes[-1].plot((edges[:-1] + edges[1:]) / 2, means, ".-", color=colour, label=label)
-    figure.colorbar(axes[1].images[0], ax=axes[len(renderings)], shrink=0.8)
+    figure.colorbar(axes[1].images[0], ax=axes[len(renderings)], shrink=0.8, label="of full scale")
     for axis in axes[:-1]:
         axis.set_axis_off()
-    axes[-1].set(xlabel="angle of the light [deg]", title="mean residual, all images")
+    axes[-1].set(xlabel="angle of the light [deg]", ylabel="of full scale", title="mean residual, all images")
     axes[-1].title.set_fontsize(10)
     axes[-1].axhline(0, color="k", linewidth=0.5)
     axes[-1].legend(fontsize=8)

@@ -263,6 +263,20 @@ OTHERS = [
         float32=2e-3,  # at the rim it is what two roots leave: relative to its apex all digits are right
     ),
     Model(
+        "he_torrance, facets",
+        lambda dtype: HeTorrance(
+            sigma0=number(0.3, dtype),
+            tau=fixed(number(2.0, dtype)),  # one width of the two
+            wavelength=fixed(number(0.55, dtype)),
+            eta=number(1.5, dtype),
+            diffuse=torch.tensor([0.28, 0.2, 0.15], dtype=dtype),
+            wave_optics=False,
+        ),
+        nodes=96,
+        float32=FACETS,
+        captured=False,
+    ),
+    Model(
         "tabulated",
         lambda dtype: TabulatedBRDF.of(
             EON(albedo=colour(dtype), roughness=number(0.3, dtype)).to(dtype),

@@ -2,7 +2,7 @@
 
 from materials import Model, colour, number
 
-from torchbrdf import GaussianHeightfield, fixed
+from torchbrdf import FastGaussianHeightfield, GaussianHeightfield, fixed
 
 # The masking of two rays has a kink where they coincide, which no panel's end follows off the plane of the view.
 CONE = 5e-5
@@ -46,6 +46,24 @@ HEIGHTFIELD = [
         lambda dtype: GaussianHeightfield(
             albedo=colour(dtype), sigma=fixed(number(0.0, dtype)), nodes=160, polar_nodes=4, table_orders=2
         ),
+        captured=False,
+    ),
+    Model(
+        "fast gaussian heightfield",
+        lambda dtype: FastGaussianHeightfield(albedo=colour(dtype), sigma=number(0.5, dtype)),
+        float32=ROUNDED,
+    ),
+    Model(
+        "fast gaussian heightfield, white",
+        lambda dtype: FastGaussianHeightfield(albedo=fixed(number(1.0, dtype)), sigma=number(0.9, dtype)),
+        energy_limit=1.002,
+        reason="a fit of a surface that returns all its light at rho = 1",
+        captured=False,
+        float32=ROUNDED,
+    ),
+    Model(
+        "fast gaussian heightfield, fixed sigma = 0",
+        lambda dtype: FastGaussianHeightfield(albedo=colour(dtype), sigma=fixed(number(0.0, dtype))),
         captured=False,
     ),
 ]

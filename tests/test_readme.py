@@ -9,6 +9,8 @@ import pytest
 from torchbrdf.accuracy import Ladder, Row
 
 ROOT = Path(__file__).parents[1]
+SOURCES = [path for package in ("torchbrdf", "inverse", "examples") for path in sorted((ROOT / package).rglob("*.py"))]
+NAMED = re.compile(r"\b((?:examples|docs|tests|torchbrdf|inverse)/[\w/]+\.(?:py|md|json|png))\b")
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCKS = [
     pytest.param(page, code, id=f"{page.name} {k}")
@@ -43,8 +45,14 @@ def test_links_and_named_files_exist(page):
     text = page.read_text()
     for link in re.findall(r"\]\((?!https?:)([^)#]+)(?:#[^)]*)?\)", text):
         assert (page.parent / link).exists(), link
-    for name in re.findall(r"\b((?:examples|docs|tests|torchbrdf|inverse)/[\w/]+\.(?:py|md|json|png))\b", text):
+    for name in NAMED.findall(text):
         assert (ROOT / name).exists(), name
+
+
+def test_files_named_in_the_code_exist():
+    for path in SOURCES:
+        for name in NAMED.findall(path.read_text()):
+            assert (ROOT / name).exists(), f"{named(path)}: {name}"
 
 
 def test_readme_is_short_and_shows_five_figures_at_most():

@@ -70,6 +70,10 @@ from torchbrdf.models.he_torrance.reflectance import (
     he_torrance,
     specular_reflectivity,
 )
+from torchbrdf.models.heightfield.fast import (
+    FastGaussianHeightfield,
+    fast_gaussian_heightfield,
+)
 from torchbrdf.models.heightfield.roughness import (
     rms_slope_from_beckmann_alpha,
     rms_slope_from_sigma,
@@ -165,6 +169,7 @@ from torchbrdf.optical_constants import (
 from torchbrdf.parameters import (
     Constrained,
     Interval,
+    ParameterValue,
     Simplex,
     fixed,
     is_per_texel,
@@ -209,6 +214,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "EFFECTS",
     "EON",
     "FUSED_SILICA",
+    "FastGaussianHeightfield",
     "FastRoughSurface",
     "Fresnel",
     "FujiiOrenNayar",
@@ -235,6 +241,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Option",
     "OrenNayar",
     "Oriented",
+    "ParameterValue",
     "Perfect",
     "Phong",
     "QualitativeOrenNayar",
@@ -261,6 +268,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "eon_albedo_from_directional",
     "eon_albedo_from_white_sky",
     "f0_from_index",
+    "fast_gaussian_heightfield",
     "fast_rough_surface",
     "fixed",
     "gaussian_heightfield",

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import torch
-from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
 from torchbrdf._numerics import safe_sqrt
 from torchbrdf.directions import Cosines, any_tangent, orthonormal_tangent
 from torchbrdf.parameters import Parametric
+from torchbrdf.quadrature import gauss_legendre
 from torchbrdf.sampling import Sampled
 
 if TYPE_CHECKING:
@@ -89,14 +89,13 @@ class BRDF(Sampled, Parametric, ABC):
         Oren-Nayar models are good to 3e-4 up to 85 degrees; narrow lobes need more nodes than they have
         widths in the hemisphere. Anisotropic models: for a view in the plane of normal and tangent.
         """
-        x, w = leggauss(nodes)
+        x, w = gauss_legendre(nodes, cos_view)
         # the nodes come first, so that per-texel parameters line up with cos_view
         column = (nodes, 1, *(1,) * cos_view.ndim)
-        cos_light = cos_view.new_tensor((1 + x) / 2).reshape(column)
-        dphi = cos_view.new_tensor((1 + x) / 2 * math.pi).reshape(column).transpose(0, 1)
-        w_light, w_dphi = (cos_view.new_tensor(w).reshape(shape) for shape in (cos_light.shape, dphi.shape))
+        cos_light, w_light = (t.reshape(column) for t in (x, w))
+        dphi, w_dphi = (math.pi * t.reshape(column).transpose(0, 1) for t in (x, w))
         # d(cos_light) d(dphi) over half the circle of azimuths, which the other half mirrors
-        weight = cos_light * (w_light / 2) * (w_dphi / 2 * math.pi) * 2
+        weight = cos_light * w_light * w_dphi * 2
         sin_view, sin_light = (safe_sqrt((1 - c) * (1 + c)) for c in (cos_view, cos_light))
         if self.anisotropic:  # the view lies in the plane of normal and tangent
             weight = torch.cat((weight, weight), 1) / 2

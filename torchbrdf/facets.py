@@ -9,16 +9,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
-from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
 from torchbrdf._numerics import angle_over_sine, dot, safe_divide
 from torchbrdf.directions import Cosines
+from torchbrdf.quadrature import gauss_legendre_rule
 from torchbrdf.v_cavity import geometric_attenuation
 
 # exp(-x^2/2) beyond is below 1e-17 of what lies before.
 _GAUSSIAN_END = 9.0
-_NODES, _WEIGHTS = (a.tolist() for a in leggauss(48))
+_NODES, _WEIGHTS = gauss_legendre_rule(48)
 _NEWTON_STEPS = 6
 _BISECTIONS = 54
 # erfcx and the first exponential agree to rounding long before; exp(-a^2) underflows anyway.
@@ -108,9 +108,9 @@ def _slope_area_integral(sigma: Tensor, end: Tensor) -> Tensor:
     nodes, weights = sigma.new_tensor(_NODES), sigma.new_tensor(_WEIGHTS)
     s = sigma[..., None]
     last = (end[..., None] / s).clamp(max=_GAUSSIAN_END)
-    x = last * (1 + nodes) / 2
+    x = last * nodes
     integrand = (-0.5 * x * x).exp() * x * torch.sinc(s * x / math.pi)
-    return (math.pi * weights * last * integrand).sum(-1)
+    return (2 * math.pi * weights * last * integrand).sum(-1)
 
 
 def slope_area_angle(u: Tensor, sigma: Tensor) -> Tensor:

@@ -14,9 +14,11 @@ from torchbrdf.parameters import (
     REFRACTIVE_INDEX,
     Constrained,
     Interval,
+    ParameterValue,
     Parametric,
     fixed,
 )
+from torchbrdf.quadrature import gauss_legendre
 
 # Relative index of a dielectric seen from either side; total internal reflection below 1.
 RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1)
@@ -198,7 +200,7 @@ class ConstantFresnel(Fresnel):
 
     value: Constrained = Constrained(ALBEDO)
 
-    def __init__(self, *, value: Tensor | float | fixed):
+    def __init__(self, *, value: ParameterValue):
         super().__init__()
         self.value = value
 
@@ -218,7 +220,7 @@ class Schlick(Fresnel):
 
     f0: Constrained = Constrained(ALBEDO)
 
-    def __init__(self, *, f0: Tensor | float | fixed = 0.04):
+    def __init__(self, *, f0: ParameterValue = 0.04):
         super().__init__()
         self.f0 = f0
 
@@ -236,7 +238,7 @@ class Dielectric(Fresnel):
 
     eta: Constrained = Constrained(REFRACTIVE_INDEX)
 
-    def __init__(self, *, eta: Tensor | float | fixed = 1.5):
+    def __init__(self, *, eta: ParameterValue = 1.5):
         super().__init__()
         self.eta = eta
 
@@ -254,7 +256,7 @@ class Conductor(Fresnel):
     eta: Constrained = Constrained(RELATIVE_INDEX)
     k: Constrained = Constrained(ABSORPTION_INDEX)
 
-    def __init__(self, *, eta: Tensor | float | fixed = 0.2, k: Tensor | float | fixed = 3.5):
+    def __init__(self, *, eta: ParameterValue = 0.2, k: ParameterValue = 3.5):
         super().__init__()
         self.eta = eta
         self.k = k
@@ -264,9 +266,6 @@ class Conductor(Fresnel):
 
     def average(self, *, nodes: int = 32) -> Tensor:
         """By Gauss-Legendre quadrature: there is no closed form. Error below 1e-9 for metals."""
-        from numpy.polynomial.legendre import leggauss
-
         eta, k = torch.atleast_1d(self.eta), torch.atleast_1d(self.k)
-        x, w = (eta.new_tensor(a).reshape(nodes, *(1,) * eta.ndim) for a in leggauss(nodes))
-        c = (1 + x) / 2
-        return (conductor(c, eta=eta, k=k) * c * w).sum(0)
+        c, w = (t.reshape(nodes, *(1,) * eta.ndim) for t in gauss_legendre(nodes, eta))
+        return (conductor(c, eta=eta, k=k) * 2 * c * w).sum(0)

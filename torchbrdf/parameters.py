@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, overload
+from typing import Any, ClassVar, TypeAlias, overload
 
 import torch
 from torch import Tensor, nn
@@ -123,6 +123,10 @@ class fixed:  # noqa: N801 - reads as a word in `OrenNayar(sigma=fixed(0.0))`
     value: Tensor | float
 
 
+# What a constructor takes for a parameter: a number or tensor is trained from there on, `fixed(...)` is held.
+ParameterValue: TypeAlias = Tensor | float | fixed
+
+
 class Constrained:
     """A parameter of a module, declared in the class body: `sigma = Constrained(ROUGHNESS)`.
 
@@ -147,7 +151,7 @@ class Constrained:
             return getattr(module, f"fixed_{self.name}")
         return self.domain.from_raw(getattr(module, f"raw_{self.name}"))
 
-    def __set__(self, module: nn.Module, value: "Tensor | float | fixed") -> None:
+    def __set__(self, module: nn.Module, value: ParameterValue) -> None:
         held = isinstance(value, fixed)
         name = f"{type(module).__name__}.{self.name}"
         given = value.value if held else value

@@ -8,14 +8,15 @@ from torch import Tensor
 
 
 @lru_cache(maxsize=64)
-def _rule(order: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def gauss_legendre_rule(order: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Gauss-Legendre nodes and weights on (0, 1), `order` numbers each."""
     nodes, weights = leggauss(order)
     return tuple((0.5 * (nodes + 1)).tolist()), tuple((0.5 * weights).tolist())
 
 
 @torch.compiler.assume_constant_result
 def _constant_rule(order: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return _rule(order)
+    return gauss_legendre_rule(order)
 
 
 def gauss_legendre(order: int, like: Tensor) -> tuple[Tensor, Tensor]:

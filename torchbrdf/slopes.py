@@ -15,12 +15,11 @@ Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 
 import math
 from functools import lru_cache
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from torchbrdf._numerics import positive, quiet_width, sinc
-from torchbrdf.quadrature import gauss_legendre
+from torchbrdf.quadrature import gauss_legendre, gauss_legendre_rule
 
 _QUARTER_TURN = 0.5 * math.pi
 _MOMENT_NODES = 64  # the moments are integrals of an analytic function over at most 9 standard deviations
@@ -29,7 +28,7 @@ _MOMENT_WIDTH = 9.0  # exp(-81/2) is below the rounding of float64
 
 @lru_cache(maxsize=32)
 def _slope_angles(count: int) -> tuple[float, ...]:
-    return (0.0, *(_QUARTER_TURN * 0.5 * (np.polynomial.legendre.leggauss(count - 1)[0] + 1)).tolist())
+    return (0.0, *(_QUARTER_TURN * node for node in gauss_legendre_rule(count - 1)[0]))
 
 
 @torch.compiler.assume_constant_result
@@ -83,16 +82,6 @@ def gaussian_weights(sigma: Tensor, *, nodes: int) -> Tensor:
     second = sampled[..., 1:2] + second_slope[..., None]
     weights = torch.cat((flat[..., None], sampled[..., :1], second, sampled[..., 2:]), dim=-1)
     return weights.reshape(*shape, nodes)
-
-
-def single_slope_weights(slope: Tensor, *, nodes: int) -> Tensor:
-    """Weights that put a single slope (...) [rad] between its two neighbours, linearly in theta^2; (..., nodes)."""
-    angle = slope.new_tensor(shared_slopes(nodes)) ** 2
-    position = (slope * slope)[..., None]
-    rise = (position - angle[:-1]) / (angle[1:] - angle[:-1])
-    rise = rise.clamp(0, 1)
-    one = torch.ones_like(position)
-    return torch.cat((one, rise), dim=-1) - torch.cat((rise, torch.zeros_like(position)), dim=-1)
 
 
 def tabulated_weights(density: Tensor, *, nodes: int) -> Tensor:

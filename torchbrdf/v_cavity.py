@@ -47,14 +47,6 @@ def strip_fraction(projection: Tensor) -> Tensor:
     return safe_divide(torch.full_like(facing, 2.0), facing, where=facing > 0).clamp(0, 1)
 
 
-def hidden_fraction(projection: Tensor) -> Tensor:
-    """Part of the facet, from the valley, that the direction does not reach: clamp(1 - 2/X), 1 for X <= 0. [-]
-
-    Source: Oren & Nayar 1994, eqs. (15), (16) repaired.
-    """
-    return 1 - strip_fraction(projection)
-
-
 def direct_integrand(light_projection: Tensor, view_projection: Tensor) -> Tensor:
     r"""GAF times both foreshortenings, min(X Y, 2X, 2Y) for X, Y > 0, else 0; no division, hence no guard.
 

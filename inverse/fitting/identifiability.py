@@ -83,9 +83,8 @@ def judge(unknowns: Unknowns, solution: Solution, covariance: Covariance, noise:
         for k in range(len(raw)):
             verdicts.append(_judge_one(entry, labels[position], raw[k].double(), errors[position]))
             position += 1
-    found = [verdict for verdict in verdicts if verdict]
     for status in ("not identified", "at bound"):
-        reasons = [reason for s, reason in found if s == status]
+        reasons = [verdict[1] for verdict in verdicts if verdict and verdict[0] == status]
         if reasons:
             return status, "; ".join(reasons)
     return solution.status, solution.reason + _texels(unknowns, solution, covariance)
@@ -136,8 +135,8 @@ def _judge_one(entry: Unknown, label: str, raw: Tensor, raw_error: Tensor) -> tu
         return None
     value, error = entry.physical(raw).item(), (entry.slope(raw) * raw_error).item()
     width = domain.high - domain.low
-    to_unit = 180 / torch.pi if domain.unit == "rad" else 1.0
-    unit = " deg" if domain.unit == "rad" else ""
+    to_unit = 180 / torch.pi if domain.angular else 1.0
+    unit = " deg" if domain.angular else ""
     for bound in (domain.low, domain.high):
         if not domain.even and abs(value - bound) < _FLAT * min(width, 1.0):
             hint = "; are exposure and irradiance right?" if bound == 1 else ""

@@ -80,8 +80,8 @@ class NormalEquations:
         mixed = self.mixed / (shared_scale[None, :, None] * own_scale[:, None, :])
         own_gradient, shared_gradient = self.own_gradient / own_scale, self.shared_gradient / shared_scale
         if not own.numel():
-            found = _boxed_solution(shared, -shared_gradient, _LONGEST_STEP * shared_scale)
-            return found / shared_scale, own_gradient
+            scaled = _boxed_solution(shared, -shared_gradient, _LONGEST_STEP * shared_scale)
+            return scaled / shared_scale, own_gradient
         alone = torch.linalg.solve(own, own_gradient[..., None])[..., 0]
         through = torch.linalg.solve(own, mixed.mT)  # (N, L, G)
         held = torch.zeros_like(alone)
@@ -127,40 +127,43 @@ def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int)
     """Minimise the sum of squares of `residual(shared (G,), own (N, L)) -> (image, pixel, channel)`."""
     dtype = shared.dtype
     equations = NormalEquations.of(residual, shared, own)
-    found = Solution(shared, own, "out of steps", f"not converged after {max_steps} steps", 0, equations)
-    found.history.append(equations.cost)
+    reached = Solution(shared, own, "out of steps", f"not converged after {max_steps} steps", 0, equations)
+    reached.history.append(equations.cost)
     if not torch.isfinite(torch.tensor(equations.cost)):
-        found.status, found.reason = "diverged", "the residuals at the start are not finite"
-        return found
+        reached.status, reached.reason = "diverged", "the residuals at the start are not finite"
+        return reached
     damping = _FIRST_DAMPING
     for _ in tqdm(range(max_steps), desc="fit", delay=_PROGRESS_AFTER_SECONDS, leave=False, disable=None):
-        found.iterations += 1
+        reached.iterations += 1
         while True:
             new_shared, new_own = (
                 (x + d.to(dtype)).clamp(-_FARTHEST[dtype], _FARTHEST[dtype])
-                for x, d in zip((found.shared, found.own), found.equations.step(damping), strict=True)
+                for x, d in zip((reached.shared, reached.own), reached.equations.step(damping), strict=True)
             )
-            moved = ((new_shared - found.shared).double(), (new_own - found.own).double())
-            decrease = found.equations.predicted_decrease(*moved)
+            moved = ((new_shared - reached.shared).double(), (new_own - reached.own).double())
+            decrease = reached.equations.predicted_decrease(*moved)
             length = max((d.abs().max().item() for d in moved if d.numel()), default=0.0)
             cost = residual(new_shared, new_own).double().square().sum().item()
-            small = 0 <= decrease <= COST_TOLERANCE[dtype] * found.equations.cost
+            small = 0 <= decrease <= COST_TOLERANCE[dtype] * reached.equations.cost
             negligible = small or length < STEP_TOLERANCE[dtype]
-            if cost <= found.equations.cost or negligible or damping > _MOST_DAMPING:
+            if cost <= reached.equations.cost or negligible or damping > _MOST_DAMPING:
                 break
             damping *= 4
-        if cost <= found.equations.cost:  # false for NaN
-            found.shared, found.own = new_shared, new_own
-            found.equations = NormalEquations.of(residual, new_shared, new_own)
+        if cost <= reached.equations.cost:  # false for NaN
+            reached.shared, reached.own = new_shared, new_own
+            reached.equations = NormalEquations.of(residual, new_shared, new_own)
             damping = max(damping / 10, _LEAST_DAMPING)
-        found.history.append(found.equations.cost)
+        reached.history.append(reached.equations.cost)
         if negligible:
-            found.status, found.reason = "converged", f"after {found.iterations} steps"
-            return found
+            reached.status, reached.reason = "converged", f"after {reached.iterations} steps"
+            return reached
         if damping > _MOST_DAMPING:
-            found.status, found.reason = "diverged", "no step decreases the residual although its gradient is not zero"
-            return found
-    return found
+            reached.status, reached.reason = (
+                "diverged",
+                "no step decreases the residual although its gradient is not zero",
+            )
+            return reached
+    return reached
 
 
 def _damped(matrix: Tensor, damping: float) -> Tensor:

@@ -3,18 +3,23 @@
 import copy
 import math
 import time
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from inverse.fitting.identifiability import Covariance, judge
 from inverse.fitting.levenberg_marquardt import Residual, Solution, minimise
+from inverse.fitting.misfit import warnings_of
 from inverse.fitting.prediction import predictor
 from inverse.fitting.result import FitResult
-from inverse.fitting.selection import checked, usable_samples
+from inverse.fitting.selection import checked, clear_of_clipping, usable_samples
 from inverse.fitting.unknowns import Unknowns
 from inverse.scene import Scene
 from torchbrdf import BRDF
+
+# Each selection of samples follows the fit before it; what the second changes is already small.
+_SELECTIONS = 3
 
 
 class FitError(RuntimeError):
@@ -43,8 +48,8 @@ def fit(
     """Least-squares fit of the model's trainable parameters to all images jointly.
 
     Levenberg-Marquardt with exact derivatives, in coordinates that keep every parameter inside its
-    domain. Which samples count is settled before the fit and never changes: object pixels that the
-    object covers fully, `valid` where given, and not saturated.
+    domain. The samples that count are object pixels that the object covers fully, `valid` where given, not
+    saturated, and, where the sensor has cut off noise, predicted clear of black and full scale (`clear_of_clipping`).
 
     Args:
         scene: geometry, lights, exposure and point-spread function, all taken as known.
@@ -63,64 +68,91 @@ def fit(
         saturated, and when no sample is left; FitError.
     """
     began = time.perf_counter()
-    dtype = scene.surface.normals.dtype
     model = checked_model(model, starts, max_steps)
-    photographs = checked(scene, photographs).detach().to(dtype)
+    photographs = checked(scene, photographs).detach()
+    dtype = _widest(scene, model)
+    scene, model = replace(scene, surface=scene.surface.to(dtype)), copy.deepcopy(model).to(dtype)
+    photographs = photographs.to(dtype)
     valid = usable_samples(scene, photographs, valid)
-    model = copy.deepcopy(model).to(dtype)
     pixels = valid.any(0)
-    measured, used = photographs[:, pixels], valid[:, pixels, None].to(dtype)
+    recorded, first_used = photographs[:, pixels], valid[:, pixels, None].expand(-1, -1, photographs.shape[-1])
     texels = pixels[scene.surface.coverage() == 1].nonzero()[:, 0]
     unknowns = Unknowns(
         model, texels, int(scene.surface.mask.sum()), scene.images,
         free_exposure=free_exposure, free_ambient=free_ambient,
     )  # fmt: skip
-    predict = predictor(scene, model, pixels, per_texel=bool(unknowns.own_entries))
+    of_material = predictor(scene, model, pixels, per_texel=bool(unknowns.own_entries))
 
-    def residual(shared: Tensor, own: Tensor) -> Tensor:
+    def predict(shared: Tensor, own: Tensor) -> Tensor:
         raw, exposure, ambient = unknowns.unpack(shared, own)
-        return (predict(raw) * exposure[:, None, None] + ambient[:, None, None] - measured) * used
+        return of_material(raw) * exposure[:, None, None] + ambient[:, None, None]
 
-    channels = predict(unknowns.unpack(*unknowns.pack())[0]).shape[-1]
+    def residual_of(used: Tensor) -> Residual:
+        return lambda shared, own: (predict(shared, own) - recorded) * used
+
+    channels = predict(*unknowns.pack()).shape[-1]
     if channels not in (1, photographs.shape[-1]):
         raise ValueError(
             f"the photographs have {photographs.shape[-1]} channels, and model and lights {channels}. "
             "A per-texel albedo has shape (points, channel)."
         )
-    samples = int(used.sum()) * photographs.shape[-1]
-    return search(
-        model, unknowns, residual, samples=samples, unit="of full scale",
-        starts=starts, seed=seed, max_steps=max_steps, throw=throw, began=began,
+    best = best_of_starts(residual_of(first_used), unknowns, starts=starts, seed=seed, max_steps=max_steps)
+    used = first_used
+    for _ in range(_SELECTIONS):
+        if best.status == "diverged":
+            break
+        clear = clear_of_clipping(scene.sensor, recorded, predict(best.shared, best.own), first_used)
+        if torch.equal(clear, used):
+            break
+        used, earlier = clear, best
+        best = minimise(residual_of(used), best.shared, best.own, max_steps=max_steps)
+        best.iterations, best.history = best.iterations + earlier.iterations, earlier.history + best.history
+    samples = int(used.sum())
+    predicted = predict(best.shared, best.own).detach()
+    unknown_values = len(best.shared) + best.own.numel()
+    warnings = warnings_of(scene.sensor, predicted, predicted - recorded, used, unknown_values)
+    return judged(
+        model, unknowns, best, samples=samples, clipped=int(first_used.sum()) - samples, warnings=warnings,
+        unit="of full scale", throw=throw, began=began,
     )  # fmt: skip
 
 
-def search(
-    model: BRDF,
-    unknowns: Unknowns,
-    residual: Residual,
-    *,
-    samples: int,
-    unit: str,
-    starts: int,
-    seed: int,
-    max_steps: int,
-    throw: bool,
-    began: float,
-) -> FitResult:
-    """The least sum of squares of `residual` over all starts, judged; `model` receives the parameters found.
-
-    Args:
-        samples: how many of the residuals are not held at 0.
-        unit: of the residuals.
-        began: `time.perf_counter()` of the caller's start.
-    Raises: FitError when the best start diverged, unless `throw` is false.
-    """
+def best_of_starts(
+    residual: Residual, unknowns: Unknowns, *, starts: int, seed: int, max_steps: int
+) -> Solution:  # fmt: skip
+    """The least sum of squares of `residual` over all starts."""
     shared, own = unknowns.pack()
     solutions = [
         minimise(residual, start, own, max_steps=max_steps) for start in _starts(unknowns, shared, starts, seed)
     ]
-    best = min(solutions, key=lambda s: s.equations.cost if math.isfinite(s.equations.cost) else math.inf)
-    result = _result(unknowns, best, model, samples=samples, unit=unit, seconds=time.perf_counter() - began)
+    return min(solutions, key=lambda s: s.equations.cost if math.isfinite(s.equations.cost) else math.inf)
+
+
+def judged(
+    model: BRDF,
+    unknowns: Unknowns,
+    best: Solution,
+    *,
+    samples: int,
+    unit: str,
+    throw: bool,
+    began: float,
+    clipped: int = 0,
+    warnings: tuple[str, ...] = (),
+) -> FitResult:
+    """What a solution says; `model` receives the parameters found.
+
+    Args:
+        samples: how many of the residuals are not held at 0.
+        clipped: how many of those held at 0 are so because they may be clipped.
+        warnings: what the residuals say against it.
+        unit: of the residuals.
+        began: `time.perf_counter()` of the caller's start.
+    Raises: FitError when it diverged, unless `throw` is false.
+    """
+    seconds = time.perf_counter() - began
+    result = _result(unknowns, best, model, samples=samples, clipped=clipped, unit=unit, seconds=seconds)
+    result = replace(result, warnings=warnings)
     if result.status == "diverged" and throw:
         raise FitError(result)
     return result
@@ -139,18 +171,29 @@ def checked_model(model: BRDF, starts: int, max_steps: int) -> BRDF:
 def _starts(unknowns: Unknowns, first: Tensor, count: int, seed: int) -> list[Tensor]:
     """The model's own start and count - 1 random ones, spread over the finite domains."""
     generator = torch.Generator().manual_seed(seed)
-    found = [first]
+    starts = [first]
     for _ in range(count - 1):
         pieces = []
         for entry, raw in unknowns.split_shared(first):
             finite = entry.domain is not None and math.isfinite(entry.domain.high)
             drawn = 0.05 + 0.9 * torch.rand(raw.shape, generator=generator, dtype=raw.dtype)
             pieces.append(torch.logit(drawn) if finite else raw)
-        found.append(torch.cat(pieces))
-    return found
+        starts.append(torch.cat(pieces))
+    return starts
 
 
-def _result(unknowns: Unknowns, best: Solution, model: BRDF, *, samples: int, unit: str, seconds: float) -> FitResult:
+def _widest(scene: Scene, model: BRDF) -> torch.dtype:
+    """The wider of the surface's dtype and those of the model's numbers."""
+    dtype = scene.surface.normals.dtype
+    for value in (*model.parameters(), *model.buffers()):
+        if value.is_floating_point():
+            dtype = torch.promote_types(dtype, value.dtype)
+    return dtype
+
+
+def _result(
+    unknowns: Unknowns, best: Solution, model: BRDF, *, samples: int, clipped: int, unit: str, seconds: float
+) -> FitResult:  # fmt: skip
     covariance = Covariance(best.equations, best.shared.dtype)
     freedom = samples - len(best.shared) - best.own.numel()
     noise = math.sqrt(best.equations.cost / freedom) if freedom > 0 else math.inf
@@ -172,21 +215,25 @@ def _result(unknowns: Unknowns, best: Solution, model: BRDF, *, samples: int, un
         in_unit = entry.physical_error(raw, error).reshape(shape)
         errors[entry.name] = unused.index_copy(0, unknowns.texels, in_unit)
     with torch.no_grad():
-        found, _, _ = unknowns.unpack(best.shared, best.own)
+        fitted, _, _ = unknowns.unpack(best.shared, best.own)
         for name, parameter in model.named_parameters():
-            if name in found:
-                parameter.copy_(found[name])
+            if name in fitted:
+                parameter.copy_(fitted[name])
     return FitResult(
         parameters=parameters,
         standard_error=errors,
         names=unknowns.shared_labels(),
         correlation=covariance.shared / (shared_error[:, None] * shared_error),
         units={entry.name: entry.domain.unit if entry.domain else "" for entry in unknowns.entries},
+        angles=frozenset(entry.name for entry in unknowns.entries if entry.domain and entry.domain.angular),
+        nuisances=tuple(entry.name for entry in unknowns.nuisances),
         status=status,
         reason=reason,
         iterations=best.iterations,
         residual_rms=math.sqrt(best.equations.cost / samples),
         samples=samples,
+        clipped=clipped,
+        warnings=(),
         seconds=seconds,
         model=model,
         history=best.history,

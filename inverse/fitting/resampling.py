@@ -8,6 +8,7 @@ from torch import Tensor
 from tqdm import tqdm
 
 from inverse.fitting.photographs import fit
+from inverse.fitting.unknowns import shared_parameters
 from inverse.scene import Scene
 from torchbrdf import BRDF
 
@@ -44,7 +45,7 @@ def bootstrap(
         raise ValueError(f"bootstrap resamples images and needs at least {_FEWEST_IMAGES}; found {scene.images}.")
     settings: dict[str, Any] = options | {"throw": False}
     generator = torch.Generator().manual_seed(seed)
-    found: dict[str, list[Tensor]] = {}
+    refits: dict[str, list[Tensor]] = {name: [] for name in shared_parameters(model)}
     refused: list[str] = []
     used = 0
     for _ in tqdm(range(samples), desc="bootstrap", leave=False, disable=None):
@@ -58,9 +59,8 @@ def bootstrap(
             refused.append(f"{result.status}: {result.reason}")
             continue
         used += 1
-        shared = {label.split("[")[0] for label in result.names} - {"exposure", "ambient"}
-        for name in shared:
-            found.setdefault(name, []).append(result.parameters[name])
+        for name, values in refits.items():
+            values.append(result.parameters[name])
     if used < max(2, samples / 2):
         raise ValueError(f"only {used} of {samples} bootstrap refits determined the parameters; {refused[0]}.")
-    return {name: torch.stack(values).std(0) for name, values in found.items()}
+    return {name: torch.stack(values).std(0) for name, values in refits.items()}

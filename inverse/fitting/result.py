@@ -22,14 +22,20 @@ class FitResult:
     """Fitted parameters, how well the data determine them, and how the fit ended.
 
     Attributes:
-        parameters: by name, in the model's own units (angles in rad); also exposure and ambient when free.
+        parameters: by name, in the model's own units (angles in rad); also the nuisances.
         standard_error: of each entry, from J'J and the residual: noise, not a wrong model or geometry.
         names, correlation: labels and correlation matrix of the shared (not per-texel) parameters.
         units: "rad" or "" by parameter name.
+        angles: names of the parameters that are angles.
+        nuisances: names of those that belong to the photographs and not to the model: "exposure" and "ambient" when
+            free, "image exposure" and "image ambient" where the model has a parameter of that name.
         status: converged | at bound | not identified | out of steps | diverged.
         reason: one sentence on the status.
         residual_rms: of the used samples, in `residual_unit`.
         samples: number of samples used.
+        clipped: number of samples left out because noise there may have been clipped at black or at full scale.
+        warnings: what residuals that are no noise of the sensor say against the fit, with the likely cause; empty where
+            nothing, and where the sensor states no noise.
         model: a fitted copy of the model.
         history: cost after each step.
         residual_unit: "of full scale" (of the sensor) for photographs, "1/sr" for measured reflectance.
@@ -40,11 +46,15 @@ class FitResult:
     names: list[str]
     correlation: Tensor
     units: dict[str, str]
+    angles: frozenset[str]
+    nuisances: tuple[str, ...]
     status: str
     reason: str
     iterations: int
     residual_rms: float
     samples: int
+    clipped: int
+    warnings: tuple[str, ...]
     seconds: float
     model: BRDF
     history: list[float]
@@ -58,8 +68,11 @@ class FitResult:
             i, j = divmod(int(strongest.argmax()), len(self.names))
             if i != j:
                 rows.append(("correlation", f"{self.correlation[i, j]:+.2f} ({self.names[i]}, {self.names[j]})"))
-        rows.append(("residual rms", f"{self.residual_rms:.3g} {self.residual_unit}, {self.samples} samples"))
-        rows.append(("status", f"{self.status}: {self.reason} ({self.seconds:.2f} s)"))
+        left_out = f", {self.clipped} left out that may be clipped" if self.clipped else ""
+        rows.append(("residual rms", f"{self.residual_rms:.3g} {self.residual_unit}, {self.samples} samples{left_out}"))
+        doubted = ", with warnings" if self.warnings else ""
+        rows.append(("status", f"{self.status}{doubted}: {self.reason} ({self.seconds:.2f} s)"))
+        rows += [("warning", warning) for warning in self.warnings]
         width = max(14, *(len(name) + 2 for name, _ in rows))
         return "\n".join(f"{name:<{width}}{text}" for name, text in rows)
 
@@ -74,33 +87,36 @@ class FitResult:
             parameters=under_new_names(self.parameters),
             standard_error=under_new_names(self.standard_error),
             units=under_new_names(self.units),
+            angles=frozenset(names.get(name, name) for name in self.angles),
             names=[names.get(name, name) for name in self.names],
         )
 
     def estimate(self, name: str) -> str:
         """A parameter and its standard error as text, angles in degrees; a summary of a per-texel one."""
-        return _estimate(self.parameters[name], self.standard_error[name], self.units[name])
+        return _estimate(self.parameters[name], self.standard_error[name], angular=name in self.angles)
 
     def to_json(self) -> dict[str, Any]:
         """Plain numbers, lists and strings; None for what is not finite. Angles in degrees, named so."""
-        found: dict[str, Any] = {"model": type(self.model).__name__, "status": self.status, "reason": self.reason}
+        report: dict[str, Any] = {"model": type(self.model).__name__, "status": self.status, "reason": self.reason}
+        report["warnings"] = list(self.warnings)
         for name, value in self.parameters.items():
-            key = f"{name}_degrees" if self.units[name] == "rad" else name
-            found[key] = _plain(in_display_unit(value, self.units[name]))
-            found[f"{key}_standard_error"] = _plain(in_display_unit(self.standard_error[name], self.units[name]))
-        found["names"], found["correlation"] = self.names, _plain(self.correlation)
-        found |= {"residual_rms": _plain(torch.tensor(self.residual_rms)), "samples": self.samples}
-        return found | {"iterations": self.iterations, "seconds": self.seconds}
+            angular = name in self.angles
+            key = f"{name}_degrees" if angular else name
+            report[key] = _plain(in_display_unit(value, angular=angular))
+            report[f"{key}_standard_error"] = _plain(in_display_unit(self.standard_error[name], angular=angular))
+        report["names"], report["correlation"] = self.names, _plain(self.correlation)
+        report |= {"residual_rms": _plain(torch.tensor(self.residual_rms)), "samples": self.samples}
+        return report | {"clipped": self.clipped, "iterations": self.iterations, "seconds": self.seconds}
 
 
-def in_display_unit(value: Tensor, unit: str) -> Tensor:
+def in_display_unit(value: Tensor, *, angular: bool) -> Tensor:
     """Degrees for angles, the value itself otherwise."""
-    return torch.rad2deg(value) if unit == "rad" else value
+    return torch.rad2deg(value) if angular else value
 
 
-def _estimate(value: Tensor, error: Tensor, unit: str) -> str:
-    value, error = in_display_unit(value, unit).double(), in_display_unit(error, unit).double()
-    suffix = " deg" if unit == "rad" else ""
+def _estimate(value: Tensor, error: Tensor, *, angular: bool) -> str:
+    value, error = (in_display_unit(k, angular=angular).double() for k in (value, error))
+    suffix = " deg" if angular else ""
     if value.numel() > 8:
         known = error[error.isfinite()]
         typical = f"{known.median():.2g}" if known.numel() else "unknown"

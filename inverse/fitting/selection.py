@@ -6,10 +6,14 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from inverse.scene import Scene, pixel_average
+from inverse.scene import Scene, Sensor, pixel_average
 
 # Photographs with fewer unsaturated samples than this share of the object are refused.
 _LEAST_UNSATURATED = 0.5
+# Noise widths from black and from full scale within which a sample may be clipped: beyond, 3 in 100 000 are.
+_CLEAR = 4.0
+# Standard deviation over median of the absolute deviation, of a normal distribution.
+_NORMAL_OVER_MEDIAN = 1.4826
 
 
 def usable(scene: Scene, *, limb: float = 70.0, highlight: float = 0.0, shadow: float = 80.0) -> Tensor:
@@ -82,3 +86,34 @@ def usable_samples(scene: Scene, photographs: Tensor, valid: Tensor | None) -> T
                 f"photograph {index} is saturated: {1 - share:.0%} of the object's samples reach full scale 1."
             )
     return allowed & unsaturated
+
+
+def clear_of_clipping(sensor: Sensor, recorded: Tensor, predicted: Tensor, used: Tensor) -> Tensor:
+    """Which of the used samples lie too far from black and full scale for their noise to be cut off there.
+
+    A cut-off noise has another mean and another width, by which ambient light, exposure and all errors come out
+    wrong. The choice follows the predicted values: to leave out the samples that were recorded dark would keep those
+    of the same pixels that noise has brightened. An end of the scale where no sample was recorded has cut nothing
+    off, nor has black where samples lie below it.
+
+    Args:
+        sensor: whose noise it is; where it states none, the width is taken from the residuals.
+        recorded, predicted, used: (image, pixel, channel); `used` bool.
+    Returns: bool of that shape; `used` itself where no sample would be left.
+    """
+    dark, bright = (recorded == 0).any() and not (recorded < 0).any(), (recorded >= 1).any()
+    if not (dark or bright):
+        return used
+    if sensor.noisy:
+        width = sensor.variance(predicted).sqrt()
+    else:
+        residuals = (recorded - predicted)[used & (recorded > 0)]
+        width = _NORMAL_OVER_MEDIAN * residuals.abs().median() if residuals.numel() else recorded.new_zeros(())
+    if sensor.bits is not None:
+        width = (width.square() + (1 / (2**sensor.bits - 1)) ** 2 / 12).sqrt()
+    clear = used
+    if dark:
+        clear = clear & (predicted > _CLEAR * width)
+    if bright:
+        clear = clear & (predicted < 1 - _CLEAR * width)
+    return clear if clear.any() else used

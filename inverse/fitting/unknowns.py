@@ -12,13 +12,17 @@ _EXPOSURE = Interval(0.0, torch.inf)
 
 @dataclass(frozen=True)
 class Unknown:
-    """One trained parameter of the model, or a nuisance of the photographs."""
+    """One trained parameter of the model, or a nuisance of the photographs.
+
+    `first` is the number of its first entry, as its labels count.
+    """
 
     name: str
     raw_name: str
     domain: Interval | Simplex | None
     start: Tensor
     per_texel: bool
+    first: int = 0
 
     def physical(self, raw: Tensor) -> Tensor:
         """Value in its own unit from the unconstrained coordinate."""
@@ -48,7 +52,7 @@ class Unknown:
         """A name for each entry of a shared unknown."""
         if self.start.numel() == 1:
             return [self.name]
-        return [f"{self.name}[{k}]" for k in range(self.start.numel())]
+        return [f"{self.name}[{self.first + k}]" for k in range(self.start.numel())]
 
 
 class Unknowns:
@@ -86,10 +90,14 @@ class Unknowns:
                 "Declare them as Constrained in the class body, or hold them with requires_grad_(False)."
             )
         blank = texels.new_zeros(images, dtype=self.entries[0].start.dtype if self.entries else torch.float32)
+        taken = {entry.name for entry in self.entries}
+        self.exposure = self.ambient = None
         if free_exposure and images > 1:
-            self.entries.append(Unknown("exposure", "", _EXPOSURE, blank[1:], False))
+            self.exposure = Unknown(_free_name("exposure", taken), "", _EXPOSURE, blank[1:], False, first=1)
         if free_ambient:
-            self.entries.append(Unknown("ambient", "", None, blank, False))
+            self.ambient = Unknown(_free_name("ambient", taken), "", None, blank, False)
+        self.nuisances = tuple(entry for entry in (self.exposure, self.ambient) if entry is not None)
+        self.entries += self.nuisances
         if not any(entry.start.numel() for entry in self.entries):
             raise ValueError(f"{type(model).__name__} has nothing to fit: every parameter is fixed.")
         self.blank, self.texels = blank, texels
@@ -111,9 +119,9 @@ class Unknowns:
         raw: dict[str, Tensor] = {}
         exposure, ambient = torch.ones_like(self.blank), self.blank
         for entry, value in self.split_shared(shared):
-            if entry.name == "exposure":
+            if entry is self.exposure:
                 exposure = torch.cat((torch.ones_like(value[:1].sum(0, keepdim=True)), entry.physical(value)))
-            elif entry.name == "ambient":
+            elif entry is self.ambient:
                 ambient = value
             else:
                 raw[entry.raw_name] = value.reshape(entry.start.shape)
@@ -133,5 +141,15 @@ class Unknowns:
 
     def shared_labels(self) -> list[str]:
         """Names of the entries of the shared vector; exposures count from the second image."""
-        labels = [label for entry in self.shared_entries for label in entry.labels()]
-        return [f"exposure[{int(x[9:-1]) + 1}]" if x.startswith("exposure[") else x for x in labels]
+        return [label for entry in self.shared_entries for label in entry.labels()]
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    """A nuisance's name, or a longer one that no attribute of a model can bear."""
+    return f"image {name}" if name in taken else name
+
+
+def shared_parameters(model: BRDF) -> list[str]:
+    """Names of the trained parameters that all points share."""
+    raw = dict(model.named_parameters())
+    return [name for name, (raw_name, domain) in trainable(model).items() if raw[raw_name].ndim <= domain.trailing]

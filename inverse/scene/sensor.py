@@ -37,6 +37,16 @@ class Sensor:
             if not kept:
                 raise ValueError(f"Sensor.{name} {rule}; found {getattr(self, name)}.")
 
+    @property
+    def noisy(self) -> bool:
+        """Whether it states any noise but that of rounding."""
+        return self.read_noise > 0 or self.full_well is not None
+
+    def variance(self, signal: Tensor) -> Tensor:
+        """Of the noise at noiseless digital values, in their shape; rounding left out. [full scale^2]"""
+        variance = torch.full_like(signal, self.read_noise**2)
+        return variance if self.full_well is None else variance + signal.clamp(min=0) / self.full_well
+
     def focus(self, image: Tensor) -> Tensor:
         """Blur images (..., rows, columns, channel) by the point-spread function; borders reflect."""
         if self.psf_sigma == 0:
@@ -56,10 +66,8 @@ class Sensor:
             generator: source of the noise; required where there is any, so that results repeat.
         """
         signal = self.focus(radiance) * self.exposure
-        variance = torch.full_like(signal, self.read_noise**2)
-        if self.full_well is not None:
-            variance = variance + signal.clamp(min=0) / self.full_well
-        if self.read_noise > 0 or self.full_well is not None:
+        variance = self.variance(signal)
+        if self.noisy:
             if generator is None:
                 raise ValueError("a noisy Sensor needs a torch.Generator: pass generator=torch.Generator().")
             noise = torch.randn(signal.shape, generator=generator, dtype=signal.dtype, device=generator.device)

@@ -8,11 +8,12 @@ pixel into s x s points, which the shading averages.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from scipy.interpolate import CubicSpline
 from torch import Tensor
+from torch.nn.functional import normalize
 
 from inverse.shapes import Cuboid, Cylinder, Plane, Revolution, Solid, Sphere
 
@@ -66,6 +67,13 @@ class Surface:
         """Rows and columns of the image in pixels."""
         rows, columns = self.mask.shape
         return rows // self.samples, columns // self.samples
+
+    def to(self, dtype: torch.dtype) -> "Surface":
+        """The same with points, normals and view directions in another dtype; unit vectors are unit in that one."""
+        if dtype == self.normals.dtype:
+            return self
+        normals, view = (normalize(k.to(dtype), dim=-1) for k in (self.normals, self.view))
+        return replace(self, points=self.points.to(dtype), normals=normals, view=view)
 
     def coverage(self) -> Tensor:
         """Share of each pixel that shows the object (rows, columns) of the image."""

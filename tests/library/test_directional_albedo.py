@@ -6,7 +6,7 @@ import torch
 from catalog import MODELS
 
 from torchbrdf import OrenNayar
-from torchbrdf import testing as laws
+from torchbrdf.testing import laws
 
 
 def test_directional_albedo_agrees_with_another_quadrature(model):

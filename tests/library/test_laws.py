@@ -4,7 +4,7 @@ import pytest
 import torch
 from catalog import MODELS
 
-from torchbrdf import testing as laws
+from torchbrdf.testing import laws
 
 TOLERANCE = laws.TOLERANCE
 HARD = list(laws.hard_directions())

@@ -12,11 +12,12 @@ pytest.importorskip("embreex", reason="the study's ray caster is not installed: 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "examples" / "heightfield_study"))
 
+import calibration  # noqa: E402
 import surfaces  # noqa: E402
 from runs import Plan, carry_out  # noqa: E402
-from samples import Sample, chi_square, distinct  # noqa: E402
+from samples import Sample, by_azimuth, chi_square, distinct, without_mesh  # noqa: E402
 from terrain import Terrain  # noqa: E402
-from tracing import Directions, trace  # noqa: E402
+from tracing import Directions, Traced, cosine_steps, on_sphere, trace  # noqa: E402
 
 STUDENT_7 = 5.408  # two-sided 1e-3 of Student's t with 7 degrees of freedom
 
@@ -91,6 +92,14 @@ def test_rays_land_on_the_surface():
     np.testing.assert_allclose(below[:, 2], points[landed][:, 2], atol=1e-4)
 
 
+def test_steps_follow_the_cosine():
+    normals = np.broadcast_to([0.6, 0.0, 0.8], (200_000, 3))
+    cosine = (cosine_steps(normals, on_sphere(len(normals), np.random.default_rng(6))) * normals).sum(1)
+    assert cosine.min() >= 0
+    for power in (1, 2, 4):  # five standard errors or more: one seed in a million fails
+        assert (cosine**power).mean() == pytest.approx(2 / (power + 2), abs=4e-3)
+
+
 def test_energy_and_projected_area():
     directions = Directions.of(np.radians([0, 40, 70]), 8)
     traced = trace(Terrain(heights(6, 12), 12, 0.67), grid(120, 12), directions, 24, np.random.default_rng(4))
@@ -133,6 +142,68 @@ def test_the_same_seed_gives_the_same_numbers(tmp_path):
     np.testing.assert_array_equal(first.f, again.f)
     with pytest.raises(ValueError, match="another plan"):
         carry_out(Plan(2, 4, (4, 8), 5, 3), surfaces.gaussian, 0.67, folder=tmp_path / "one", processes=1)
+
+
+def test_means_over_azimuth_keep_what_depends_on_the_difference():
+    directions = Directions.of(np.radians([0, 30, 70]), 8)
+    cosine = directions.unit @ directions.unit.T  # symmetric, and an even function of dphi
+    f, _ = by_azimuth(Traced(cosine[None], np.ones((1, len(directions.unit)))), directions)
+    theta, dphi = directions.polar, 2 * np.pi * np.arange(8) / 8
+    i, r = theta[:, None, None], theta[None, :, None]
+    expected = np.sin(i) * np.sin(r) * np.cos(dphi) + np.cos(i) * np.cos(r)
+    np.testing.assert_allclose(f[0], expected, atol=1e-12)
+
+
+def test_the_limit_of_a_quadratic_bias_is_exact():
+    coarse, fine = (3.0 + 0.7 * cell**2 for cell in (1 / 8, 1 / 24))
+    assert without_mesh(np.array(coarse), np.array(fine), 3) == pytest.approx(3.0, rel=1e-14)
+
+
+class Bent:
+    """Stands for a model: four constants and an occlusion that bend f_1 in ways of their own."""
+
+    constants = (0.5, 0.3, 3.0, 1.0)
+    highest_occlusion = 2.0
+
+    def __init__(self, polar: np.ndarray):
+        i, r, k = polar[:, None, None], polar[None, :, None], np.arange(16)
+        half = np.abs(np.sin(np.pi * k / 16))
+        self.shapes = [np.sin(i) * np.sin(r) + 0 * half, (i * r) ** 2 + 0 * half, half * i * r, half * (i * r) ** 3]
+        self.local = np.cos(i) * np.cos(r) + 0 * half
+
+    def __call__(self, slope, occlusion, constants, bounces):
+        terms = zip(constants, self.shapes, strict=True)
+        bend = sum(slope * c * shape for c, shape in terms) + 0.2 * occlusion * self.local
+        return np.repeat((np.exp(-0.1 * bend) / math.pi)[None], bounces, axis=0)
+
+
+def test_calibration_recovers_constants_within_its_errors():
+    polar, rng = np.radians([0, 10, 20, 30, 40, 50, 60, 67.5, 75, 80]), np.random.default_rng(8)
+    model, true = Bent(polar), np.array([0.45, 0.25, 3.4, 1.3])
+    pulls, e_pulls = [], []
+    for _ in range(12):
+        samples = []
+        for slope in (0.3, 1.0):
+            common = 1 + 0.002 * rng.standard_normal((20, 1, 1, 1, 1))  # surfaces err in all directions together
+            f = model(slope, 1.3, true, 1) * common * (1 + 0.01 * rng.standard_normal((20, 1, 10, 10, 16)))
+            samples.append(Sample.of(slope, polar, f, np.ones((20, 1, 10))))
+        fit = calibration.occlusion(model, true.tolist(), samples)
+        e_pulls.append((fit.values[0] - 1.3) / fit.errors[0])
+        smooth = [
+            Sample.of(
+                x.slope,
+                polar,
+                x.each * model(x.slope, 1.0, true, 1) / model(x.slope, 1.3, true, 1),
+                np.ones((20, 1, 10)),
+            )
+            for x in samples
+        ]
+        fit = calibration.constants(model, smooth)
+        pulls.append((fit.values - true) / fit.errors)
+    # Mean squares of 12 pulls, Student's t of 19 degrees of freedom: one seed in a hundred fails.
+    squares = np.append(np.mean(np.square(pulls), axis=0), np.mean(np.square(e_pulls)))
+    assert squares.min() > 0.15
+    assert squares.max() < 3.3
 
 
 @pytest.mark.slow

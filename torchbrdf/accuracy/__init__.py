@@ -9,9 +9,13 @@ from torchbrdf.accuracy.ladders import (
     forward_ratios,
     interleaved_medians,
     ladder,
-    reference,
     relative_errors,
     rungs_of,
+)
+from torchbrdf.accuracy.references import (
+    converged,
+    reference,
+    reference_error,
 )
 from torchbrdf.accuracy.series import (
     SCHEMES,
@@ -29,12 +33,14 @@ __all__ = [
     "Rung",
     "SeriesLadder",
     "SeriesRow",
+    "converged",
     "cost",
     "expanded",
     "forward_ratios",
     "interleaved_medians",
     "ladder",
     "reference",
+    "reference_error",
     "relative_errors",
     "rungs_of",
     "series_ladder",

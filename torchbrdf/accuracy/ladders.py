@@ -1,4 +1,4 @@
-"""What accuracy costs: each rung of the Oren-Nayar ladder against the converged model, in error, time and memory.
+"""What accuracy costs: each rung of the Oren-Nayar ladder against its reference, in error, time and memory.
 
 Lambert < qualitative < functional < closed-form slopes < fitted < exact slopes < exact with all bounces
 """
@@ -13,6 +13,7 @@ from dataclasses import asdict, dataclass, replace
 import torch
 from torch import Tensor
 
+from torchbrdf.accuracy.references import reference
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import PIXELS_AT_A_TIME, ImageBRDF, LinearBRDF
@@ -85,11 +86,6 @@ def _of_the_paper() -> tuple[Rung, ...]:
 RUNGS = _of_the_paper()
 
 
-def reference(albedo: Tensor, sigma: Tensor) -> RoughSurface:
-    """The top of the ladder: 64 slopes, all bounces, graded azimuths."""
-    return RoughSurface(albedo=albedo, sigma=sigma, nodes=64, order=6, graded=True, bounces="all", modes=8)
-
-
 @dataclass(frozen=True)
 class Row:
     """One rung, measured. Errors are relative to the reference; times are ratios to Lambert in the same run."""
@@ -154,7 +150,7 @@ def ladder(
         rho: facet albedo, or several; every sigma is taken with every rho. [-]
         cosines: of the directions to judge by, (...); those below the horizon do not count.
         rungs: models to compare; the first is the unit of time. `rungs_of` lists those of a model of your own.
-        against: builds what they are compared with.
+        against: builds what they are compared with; `reference_error` says how far `reference` is from `converged`.
         repeats: timings of each, interleaved; the median counts.
         compiled: time the models under torch.compile.
     Returns: Ladder. Errors are computed in float64, times in the dtype of the cosines, saved bytes in eager mode.

@@ -11,7 +11,7 @@ from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.facets import HalfVector
 from torchbrdf.fresnel import fifth_power, schlick
-from torchbrdf.parameters import ALBEDO, EXPONENT, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, EXPONENT, Constrained, ParameterValue
 from torchbrdf.sampling import choose, cosine_hemisphere, mirrored
 
 
@@ -63,10 +63,10 @@ class AshikhminShirley(BRDF):
     def __init__(
         self,
         *,
-        diffuse: Tensor | float | fixed = 0.5,
-        specular: Tensor | float | fixed = 0.05,
-        exponent_x: Tensor | float | fixed = 10.0,
-        exponent_y: Tensor | float | fixed = 100.0,
+        diffuse: ParameterValue = 0.5,
+        specular: ParameterValue = 0.05,
+        exponent_x: ParameterValue = 10.0,
+        exponent_y: ParameterValue = 100.0,
     ):
         super().__init__()
         self.diffuse = diffuse

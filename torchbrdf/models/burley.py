@@ -9,7 +9,7 @@ from torch import Tensor
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.fresnel import fifth_power
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, ParameterValue
 
 BURLEY_ROUGHNESS = Interval(0.0, 1.0)
 
@@ -65,8 +65,8 @@ class Burley(BRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        roughness: Tensor | float | fixed = 0.5,
+        albedo: ParameterValue = 0.5,
+        roughness: ParameterValue = 0.5,
         renormalised: bool = False,
     ):
         super().__init__()

@@ -21,7 +21,7 @@ from torchbrdf.facets import (
     tangent_squared,
 )
 from torchbrdf.fresnel import Fresnel, Schlick
-from torchbrdf.parameters import WIDTH, Constrained, declared, fixed, kept
+from torchbrdf.parameters import WIDTH, Constrained, ParameterValue, declared, fixed, kept
 from torchbrdf.sampling import mirrored, visible_beckmann_facet, visible_ggx_facet
 
 
@@ -79,7 +79,7 @@ class _Isotropic(_Microfacet):
     def __init__(
         self,
         *,
-        alpha: Tensor | float | fixed = 0.3,
+        alpha: ParameterValue = 0.3,
         fresnel: Fresnel | None = None,
         masking: Masking = smith_correlated,
     ):
@@ -105,8 +105,8 @@ class _Anisotropic(_Microfacet):
     def __init__(
         self,
         *,
-        alpha_x: Tensor | float | fixed = 0.1,
-        alpha_y: Tensor | float | fixed = 0.4,
+        alpha_x: ParameterValue = 0.1,
+        alpha_y: ParameterValue = 0.4,
         fresnel: Fresnel | None = None,
         masking: Masking = smith_correlated,
     ):

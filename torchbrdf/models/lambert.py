@@ -8,7 +8,7 @@ from torch import Tensor
 
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
-from torchbrdf.parameters import ALBEDO, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, Constrained, ParameterValue
 
 
 @final
@@ -25,7 +25,7 @@ class Lambert(LinearBRDF):
 
     albedo: Constrained = Constrained(ALBEDO)
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5):
+    def __init__(self, *, albedo: ParameterValue = 0.5):
         super().__init__()
         self.albedo = albedo
 

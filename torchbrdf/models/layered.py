@@ -10,7 +10,7 @@ from torchbrdf._numerics import safe_divide
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.fresnel import Fresnel, Perfect, Schlick
-from torchbrdf.parameters import ALBEDO, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, Constrained, ParameterValue
 from torchbrdf.sampling import choose, cosine_hemisphere
 
 
@@ -97,7 +97,7 @@ class Coupled(_Polished):
 
     albedo: Constrained = Constrained(ALBEDO)
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5, fresnel: Fresnel | None = None):
+    def __init__(self, *, albedo: ParameterValue = 0.5, fresnel: Fresnel | None = None):
         super().__init__()
         self.albedo = albedo
         self.fresnel = Schlick(f0=self.albedo.new_tensor(0.04)) if fresnel is None else fresnel
@@ -139,7 +139,7 @@ class Dampened(_Polished):
 
     albedo: Constrained = Constrained(ALBEDO)
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5, fresnel: Fresnel | None = None):
+    def __init__(self, *, albedo: ParameterValue = 0.5, fresnel: Fresnel | None = None):
         super().__init__()
         self.albedo = albedo
         self.fresnel = Schlick(f0=self.albedo.new_tensor(0.04)) if fresnel is None else fresnel

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.parameters import ALBEDO, EXPONENT, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, EXPONENT, Constrained, ParameterValue
 from torchbrdf.sampling import power_cosine
 
 
@@ -49,7 +49,7 @@ class Minnaert(BRDF):
     albedo: Constrained = Constrained(ALBEDO)
     k: Constrained = Constrained(EXPONENT)
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5, k: Tensor | float | fixed = 1.2):
+    def __init__(self, *, albedo: ParameterValue = 0.5, k: ParameterValue = 1.2):
         super().__init__()
         self.albedo = albedo
         self.k = k

@@ -9,7 +9,7 @@ from torch import Tensor
 from torchbrdf._numerics import dot, power_of_complement
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.parameters import ALBEDO, EXPONENT, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, EXPONENT, Constrained, ParameterValue
 from torchbrdf.sampling import choose, cosine_hemisphere, mirrored, power_cosine, towards
 
 
@@ -71,9 +71,9 @@ class _Phong(BRDF):
     def __init__(
         self,
         *,
-        diffuse: Tensor | float | fixed = 0.4,
-        specular: Tensor | float | fixed = 0.2,
-        exponent: Tensor | float | fixed = 20.0,
+        diffuse: ParameterValue = 0.4,
+        specular: ParameterValue = 0.2,
+        exponent: ParameterValue = 20.0,
     ):
         super().__init__()
         self.diffuse = diffuse

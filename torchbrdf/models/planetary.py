@@ -10,7 +10,7 @@ from torchbrdf._numerics import angle, safe_divide, safe_power, safe_sqrt, sine_
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, ParameterValue
 
 ASYMMETRY = Interval(-1.0, 1.0)
 SURGE = Interval(0.0, math.inf)
@@ -76,7 +76,7 @@ class LommelSeeliger(LinearBRDF):
     albedo: Constrained = Constrained(ALBEDO)
     uniform_share = 0.5
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5):
+    def __init__(self, *, albedo: ParameterValue = 0.5):
         super().__init__()
         self.albedo = albedo
 
@@ -110,7 +110,7 @@ class LambertSphere(LinearBRDF):
     albedo: Constrained = Constrained(ALBEDO)
     uniform_share = 0.25
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5):
+    def __init__(self, *, albedo: ParameterValue = 0.5):
         super().__init__()
         self.albedo = albedo
 
@@ -152,10 +152,10 @@ class Hapke(BRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        asymmetry: Tensor | float | fixed = -0.3,
-        surge: Tensor | float | fixed = 0.5,
-        surge_width: Tensor | float | fixed = 0.05,
+        albedo: ParameterValue = 0.5,
+        asymmetry: ParameterValue = -0.3,
+        surge: ParameterValue = 0.5,
+        surge_width: ParameterValue = 0.05,
     ):
         super().__init__()
         self.albedo = albedo

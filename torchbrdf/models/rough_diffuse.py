@@ -13,7 +13,7 @@ from torchbrdf.effects import INTERREFLECTION, ROUGHNESS
 from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.models.rungs import Member, lambert, stand_ins
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed, kept
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, ParameterValue, kept
 from torchbrdf.sampling import CltcSampled
 
 # 1/2 - 2/(3 pi) and 2/3 - 28/(15 pi): the mean of the retro term at grazing, and over the hemisphere.
@@ -115,7 +115,7 @@ class FujiiOrenNayar(_RoughDiffuse):
         mimosa-pudica.net/improved-oren-nayar.html; Portsmouth, Kutz & Hill 2025 (as `EON`).
     """
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5, roughness: Tensor | float | fixed = 0.5):
+    def __init__(self, *, albedo: ParameterValue = 0.5, roughness: ParameterValue = 0.5):
         super().__init__()
         self.albedo = albedo
         self.roughness = roughness
@@ -161,8 +161,8 @@ class EON(_RoughDiffuse):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        roughness: Tensor | float | fixed = 0.5,
+        albedo: ParameterValue = 0.5,
+        roughness: ParameterValue = 0.5,
         exact: bool = True,
     ):
         super().__init__()

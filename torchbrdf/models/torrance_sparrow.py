@@ -18,7 +18,7 @@ from torchbrdf.facets import (
     visible_azimuth,
 )
 from torchbrdf.fresnel import Fresnel, Perfect
-from torchbrdf.parameters import ROUGHNESS, Constrained, fixed, kept
+from torchbrdf.parameters import ROUGHNESS, Constrained, ParameterValue, kept
 from torchbrdf.sampling import along_view, mirrored
 
 
@@ -78,7 +78,7 @@ class TorranceSparrow(BRDF):
 
     sigma: Constrained = Constrained(ROUGHNESS)
 
-    def __init__(self, *, sigma: Tensor | float | fixed = 0.3, fresnel: Fresnel | None = None, normalised: bool = True):
+    def __init__(self, *, sigma: ParameterValue = 0.3, fresnel: Fresnel | None = None, normalised: bool = True):
         super().__init__()
         self.sigma = sigma
         self.fresnel = Perfect() if fresnel is None else fresnel

@@ -14,10 +14,10 @@ import math
 from dataclasses import dataclass
 
 import torch
-from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
 from torchbrdf.brdf import BRDF
+from torchbrdf.quadrature import gauss_legendre
 from torchbrdf.sampling import Sample
 
 # Azimuth of every view, from the tangent. [rad]
@@ -56,16 +56,16 @@ class SamplingSetup:
 
     def probabilities(self, rings: int, sectors: int, nodes: int) -> Tensor:
         """What the density says of each bin (ring of equal cosine, sector of azimuth from the tangent)."""
-        x, w = (torch.from_numpy(a) for a in leggauss(nodes))
+        x, w = gauss_legendre(nodes, self.view)
         # the square root of the cosine spreads the bins towards the horizon, where densities peak
         edge = torch.linspace(0, 1, rings + 1, dtype=torch.float64)
-        r = (edge[:-1, None] + (1 + x) / 2 / rings).flatten()
-        phi = ((torch.arange(sectors, dtype=torch.float64)[:, None] + (1 + x) / 2) * 2 * math.pi / sectors).flatten()
+        r = (edge[:-1, None] + x / rings).flatten()
+        phi = ((torch.arange(sectors, dtype=torch.float64)[:, None] + x) * 2 * math.pi / sectors).flatten()
         cos = (r * r)[:, None]
         sin = ((1 - cos) * (1 + cos)).sqrt()
         local = torch.stack(torch.broadcast_tensors(sin * phi.cos(), sin * phi.sin(), cos), -1)
         light = torch.nn.functional.normalize(local @ self.axes, dim=-1)
-        weight = (2 * r * w.repeat(rings) / (2 * rings))[:, None] * (w.repeat(sectors) * math.pi / sectors)
+        weight = (2 * r * w.repeat(rings) / rings)[:, None] * (w.repeat(sectors) * 2 * math.pi / sectors)
         p = self.pdf(light.reshape(-1, 3)).reshape(weight.shape) * weight
         return p.reshape(rings, nodes, sectors, nodes).sum((1, 3))
 

@@ -1,7 +1,8 @@
-"""(27), (28) and (30) of the paper as printed, in angles."""
+"""(27), (28) and (30) of the paper as printed, in angles; (19) by its strings."""
 
 import math
 
+import mpmath
 import torch
 
 PI = math.pi
@@ -30,3 +31,15 @@ def qualitative_by_angles(theta_i, theta_r, dphi, rho, sigma, *, constant=0.33):
 
 def direction(theta, phi=0.0):
     return [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
+
+
+def crossed_strings(hidden_light, hidden_view, slope):
+    """IF of (19) between the lit strip [m_s, 1] of one facet and the visible one [m_v, 1] of the other, by Hottel."""
+    with mpmath.workdps(40):
+        turn = mpmath.cos(2 * mpmath.mpf(slope))
+
+        def string(x, y):
+            return mpmath.sqrt(x * x + 2 * x * y * turn + y * y)
+
+        light, view = mpmath.mpf(hidden_light), mpmath.mpf(hidden_view)
+        return float(mpmath.pi / 2 * (string(1, light) + string(view, 1) - string(1, 1) - string(light, view)))

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 import torch
+from paper_form import crossed_strings
 
 from torchbrdf.models.oren_nayar.cavity_modes import bounce_coefficients, facet_modes, modes_of
 from torchbrdf.models.oren_nayar.images import Bounces, cavity_images
-from torchbrdf.models.oren_nayar.interreflection import two_bounce_factor
 from torchbrdf.quadrature import gauss_legendre
 from torchbrdf.v_cavity import strip_fraction
 
@@ -52,8 +52,8 @@ def _energy(slope, light, albedo, count):
     left, right = light * tangent, -light * tangent
     first = sum(((1 + z).clamp(min=0) * strip_fraction(z)).item() for z in (left, right))
     hidden = [1 - strip_fraction(z) for z in (left, right)]
-    exchange = [two_bounce_factor(h, torch.zeros_like(h), cos_slope=cosine) / math.pi for h in hidden]
-    second = sum(((1 + z).clamp(min=0) * e).item() for z, e in zip((left, right), exchange, strict=True))
+    exchange = [crossed_strings(h.item(), 0.0, math.acos(cosine.item())) / math.pi for h in hidden]
+    second = sum((1 + z).clamp(min=0).item() * e for z, e in zip((left, right), exchange, strict=True))
     whole = facet_modes(modes, torch.ones(1, dtype=F64))[0] / 2
     lit = (facet_modes(modes, left[None]) + facet_modes(modes, right[None]))[0]
     rest = (lit * whole * material.sum(-1)[0]).sum().item()

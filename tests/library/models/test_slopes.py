@@ -16,7 +16,7 @@ from torchbrdf.models.oren_nayar.azimuth import direct_mean
 from torchbrdf.models.oren_nayar.converged import converged
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane, slope_plane_from_angles
 from torchbrdf.quadrature import gauss_legendre
-from torchbrdf.slopes import gaussian_density, gaussian_moments, single_slope_weights
+from torchbrdf.slopes import gaussian_density, gaussian_moments
 
 F64 = torch.float64
 
@@ -62,9 +62,6 @@ def test_other_distributions():
         rtol=1e-6,
         atol=1e-9,
     )
-    single = single_slope_weights(angle[5], nodes=24)
-    assert single[5].item() == pytest.approx(1)
-    assert (single * angle**2).sum().item() == pytest.approx(angle[5].item() ** 2)
 
 
 def test_samples_follow_the_distribution():

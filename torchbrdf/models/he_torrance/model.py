@@ -32,7 +32,7 @@ from torchbrdf.models.he_torrance.sampling import (
     specular_light,
 )
 from torchbrdf.models.he_torrance.specular import averaged_specular, averaged_specular_albedo, check_solid_angle
-from torchbrdf.parameters import ABSORPTION_INDEX, ALBEDO, Constrained, fixed, is_per_texel
+from torchbrdf.parameters import ABSORPTION_INDEX, ALBEDO, Constrained, ParameterValue, fixed, is_per_texel
 from torchbrdf.sampling import choose, cosine_hemisphere
 
 # Beyond, a smooth dielectric reflects everything and leaves nothing to a.
@@ -88,12 +88,12 @@ class HeTorrance(BRDF):
     def __init__(
         self,
         *,
-        sigma0: Tensor | float | fixed,
-        tau: Tensor | float | fixed,
-        wavelength: Tensor | float | fixed,
-        eta: Tensor | float | fixed = 1.5,
-        k: Tensor | float | fixed | None = None,
-        diffuse: Tensor | float | fixed | None = None,
+        sigma0: ParameterValue,
+        tau: ParameterValue,
+        wavelength: ParameterValue,
+        eta: ParameterValue = 1.5,
+        k: ParameterValue | None = None,
+        diffuse: ParameterValue | None = None,
         solid_angle: float | None = None,
         specular: bool = True,
         directional_diffuse: bool = True,

@@ -12,7 +12,7 @@ from torchbrdf.effects import ANISOTROPY
 from torchbrdf.linear import ImageBRDF
 from torchbrdf.models.oren_nayar.images import Bounces, cavity_images, flat_coefficients
 from torchbrdf.models.oren_nayar.rough_surface import RoughSurface
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed, kept
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, ParameterValue, fixed, kept
 from torchbrdf.quadrature import gauss_legendre
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
@@ -53,9 +53,9 @@ class AnisotropicRoughSurface(CltcSampled, ImageBRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma_x: Tensor | float | fixed = 0.3,
-        sigma_y: Tensor | float | fixed = 0.3,
+        albedo: ParameterValue = 0.5,
+        sigma_x: ParameterValue = 0.3,
+        sigma_y: ParameterValue = 0.3,
         nodes: int = 16,
         azimuths: int = 24,
         bounces: Literal[1, 2] = 2,

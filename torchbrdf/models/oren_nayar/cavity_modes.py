@@ -25,6 +25,7 @@ from numpy.polynomial import legendre
 from torch import Tensor
 
 from torchbrdf._numerics import positive
+from torchbrdf.quadrature import gauss_legendre_rule
 
 _NODES = 64  # along x and along v = y/x; a sinh substitution makes kernel and g as smooth as the polynomials are
 _STRIP_NODES = 48  # strip widths at which G_n is sampled for its expansion
@@ -161,11 +162,11 @@ def _graded_nodes(cosine: float, sine: float, centre: float = 1.0) -> tuple[np.n
     """Nodes and weights on [0, 1], dense where d(x, centre) is smallest: x + centre cos(2 theta) = centre sin(2 theta)
     sinh(eta).
     """
-    eta, weight = legendre.leggauss(_NODES)
+    eta, weight = (np.array(numbers) for numbers in gauss_legendre_rule(_NODES))
     start, stop = math.asinh(cosine / sine), math.asinh((1 / centre + cosine) / sine)
-    eta = 0.5 * (stop + start) + 0.5 * (stop - start) * eta
+    eta = start + (stop - start) * eta
     nodes = np.clip(centre * (sine * np.sinh(eta) - cosine), 0, 1)
-    weights = 0.5 * (stop - start) * weight * centre * sine * np.cosh(eta)
+    weights = (stop - start) * weight * centre * sine * np.cosh(eta)
     return nodes, weights
 
 

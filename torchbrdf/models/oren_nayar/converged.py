@@ -1,4 +1,4 @@
-"""The slow reference: Gaussian slopes integrated to about ten digits, the top rung of the ladder of accuracy.
+"""The slow reference behind `torchbrdf.accuracy.converged`: Gaussian slopes integrated to about ten digits.
 
 The azimuth mean of one slope angle is exact (direct) or split at every kink (interreflection). As a function of the
 slope angle it has kinks of its own where a direction starts to be cut (tan theta_a = 1/tan theta) and where two lobes

@@ -19,7 +19,7 @@ from torchbrdf.directions import Cosines
 from torchbrdf.models.oren_nayar.functional import OrenNayar
 from torchbrdf.models.oren_nayar.ring import KAPPA, KNEE, Ring, Term, chebyshev, chebyshev_slope, contract, knee, ring
 from torchbrdf.models.rungs import Member, stand_ins
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed, kept
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 Bounces = Literal[2, "all"]
@@ -195,9 +195,7 @@ class FastRoughSurface(CltcSampled, BRDF):
     albedo: Constrained = Constrained(ALBEDO)
     sigma: Constrained = Constrained(ROUGHNESS)
 
-    def __init__(
-        self, *, albedo: Tensor | float | fixed = 0.5, sigma: Tensor | float | fixed = 0.3, bounces: Bounces = "all"
-    ):
+    def __init__(self, *, albedo: ParameterValue = 0.5, sigma: ParameterValue = 0.3, bounces: Bounces = "all"):
         super().__init__()
         _check_bounces("FastRoughSurface", bounces)
         self.albedo = albedo

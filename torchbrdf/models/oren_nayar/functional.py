@@ -14,7 +14,7 @@ from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
 from torchbrdf.models.rungs import Member, stand_ins
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed, kept
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
@@ -52,7 +52,7 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
 
 
 def fields(cosines: Cosines, sigma: Tensor, *, c3: bool = True) -> tuple[Tensor, Tensor]:
-    """Light reflected once and twice by white facets, (27) and (28), each (...). [1/sr]"""
+    """Light reflected once and twice by white facets, Oren & Nayar 1994, eqs. (27) and (28), each (...). [1/sr]"""
     _, along, across, bounce = geometry_terms(cosines, c3=c3)
     s2 = sigma * sigma
     slope = s2 / (math.pi * (s2 + 0.09))
@@ -122,8 +122,8 @@ class OrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma: Tensor | float | fixed = 0.3,
+        albedo: ParameterValue = 0.5,
+        sigma: ParameterValue = 0.3,
         direct: bool = True,
         interreflection: bool = True,
         c3: bool = True,

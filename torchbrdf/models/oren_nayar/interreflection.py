@@ -12,38 +12,9 @@ Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 
 
 import math
 
-import torch
 from torch import Tensor
 
 from torchbrdf._numerics import safe_divide, safe_sqrt
-
-
-def two_bounce_factor(hidden_light: Tensor, hidden_view: Tensor, *, cos_slope: Tensor) -> Tensor:
-    r"""Exchange between the lit strip [m_s, 1] of one facet and the visible strip [m_v, 1] of the other.
-
-    .. math:: IF = (\pi/2)[\delta(1,1) + \delta(m_s,m_v) - \delta(1,m_s) - \delta(1,m_v)],\quad
-              \delta(x,y) = x + y - d(x,y) = 4xy\sin^2\theta_a / (x+y+d(x,y))
-
-    The delta form has the factor sin^2 in every term; the four distances of the source's eq. (20) cancel to
-    nothing on shallow slopes.
-
-    Source: Oren & Nayar 1994, eqs. (19), (20).
-
-    Args: hidden fractions m_s, m_v and cos(theta_a), broadcastable (...). [-]
-    Returns: IF (...). [-] in [0, pi (1 - cos(theta_a))]
-    """
-    one = torch.ones_like(cos_slope * hidden_light * hidden_view)
-    delta_sum = _shortcut(one, one, cos_slope) + _shortcut(hidden_light, hidden_view, cos_slope)
-    return (
-        0.5 * math.pi * (delta_sum - _shortcut(one, hidden_light, cos_slope) - _shortcut(one, hidden_view, cos_slope))
-    )
-
-
-def two_bounce_factor_approximate(hidden_light: Tensor, hidden_view: Tensor, *, cos_slope: Tensor) -> Tensor:
-    """IF as if every strip exchanged the mean share: pi (1 - cos(theta_a)) (1 - m_s)(1 - m_v); exact when
-    nothing is hidden. Source: Oren & Nayar 1994, eq. (48).
-    """
-    return math.pi * (1 - cos_slope) * (1 - hidden_light) * (1 - hidden_view)
 
 
 def two_bounce_integrand(opposite_light: Tensor, view_projection: Tensor, *, cos_slope: Tensor) -> Tensor:
@@ -94,11 +65,3 @@ def two_bounce_facet(light_projection: Tensor, view_projection: Tensor, *, cos_s
         * two_bounce_integrand(-light_projection, view_projection, cos_slope=cos_slope)
         / math.pi
     )
-
-
-def _shortcut(x: Tensor, y: Tensor, cos_slope: Tensor) -> Tensor:
-    """delta(x, y) = x + y - d(x, y): by how much the straight line beats the way through the valley."""
-    total = x + y
-    distance = safe_sqrt(total * total * cos_slope * cos_slope + (x - y) ** 2 * (1 - cos_slope) * (1 + cos_slope))
-    numerator = 4 * x * y * (1 - cos_slope) * (1 + cos_slope)
-    return safe_divide(numerator, total + distance, where=total > 0)

@@ -13,7 +13,7 @@ from torchbrdf.directions import Cosines
 from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.models.rungs import Member, lambert, stand_ins
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
@@ -82,8 +82,8 @@ class QualitativeOrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma: Tensor | float | fixed = 0.3,
+        albedo: ParameterValue = 0.5,
+        sigma: ParameterValue = 0.3,
         a_constant: float = 0.33,
     ):
         super().__init__()

@@ -17,7 +17,7 @@ from torchbrdf.models.oren_nayar.functional import OrenNayar
 from torchbrdf.models.oren_nayar.images import Bounces, flat_coefficients, mean_images
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane, slope_plane
 from torchbrdf.models.rungs import Member, stand_ins
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Simplex, fixed, kept
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, Simplex, fixed, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 from torchbrdf.slopes import gaussian_weights, shared_slopes
 
@@ -128,8 +128,8 @@ class RoughSurface(SharedSlopes):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma: Tensor | float | fixed = 0.3,
+        albedo: ParameterValue = 0.5,
+        sigma: ParameterValue = 0.3,
         nodes: int = 16,
         order: int = 4,
         graded: bool = False,
@@ -194,7 +194,7 @@ class TabulatedRoughSurface(SharedSlopes):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
+        albedo: ParameterValue = 0.5,
         weights: Tensor | fixed,
         order: int = 4,
         graded: bool = False,
@@ -239,7 +239,7 @@ class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
     albedo: Constrained = Constrained(ALBEDO)
     sigma: Constrained = Constrained(ROUGHNESS)
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5, sigma: Tensor | float | fixed = 0.3, nodes: int = 16):
+    def __init__(self, *, albedo: ParameterValue = 0.5, sigma: ParameterValue = 0.3, nodes: int = 16):
         super().__init__()
         shared_slopes(nodes)
         self.albedo = albedo

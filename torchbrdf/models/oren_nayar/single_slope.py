@@ -13,7 +13,7 @@ from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, modes_of
 from torchbrdf.models.oren_nayar.images import Bounces, added, cavity_images, mean_images
 from torchbrdf.models.oren_nayar.rough_surface import BounceCount
 from torchbrdf.models.oren_nayar.slope_plane import slope_plane
-from torchbrdf.parameters import ALBEDO, Constrained, Interval, fixed
+from torchbrdf.parameters import ALBEDO, Constrained, Interval, ParameterValue
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 # Steeper than 89 degrees a cavity is 57 times deeper than half its width, and the tangent leaves float32.
@@ -68,8 +68,8 @@ class SingleSlopeVCavities(_OneSlope):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        slope: Tensor | float | fixed = 0.5,
+        albedo: ParameterValue = 0.5,
+        slope: ParameterValue = 0.5,
         order: int = 16,
         bounces: BounceCount = 2,
         modes: int = 12,
@@ -112,7 +112,7 @@ class ClosedFormVCavities(_OneSlope):
     Source: Oren & Nayar 1994, long version (as `SingleSlopeVCavities`), eqs. (24), (45), (49).
     """
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5, slope: Tensor | float | fixed = 0.5):
+    def __init__(self, *, albedo: ParameterValue = 0.5, slope: ParameterValue = 0.5):
         super().__init__()
         self.albedo = albedo
         self.slope = slope
@@ -155,8 +155,8 @@ class UnidirectionalVCavities(_OneSlope):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        slope: Tensor | float | fixed = 0.5,
+        albedo: ParameterValue = 0.5,
+        slope: ParameterValue = 0.5,
         bounces: BounceCount = 2,
         modes: int = 12,
     ):
