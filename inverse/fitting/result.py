@@ -88,7 +88,7 @@ class FitResult:
             standard_error=under_new_names(self.standard_error),
             units=under_new_names(self.units),
             angles=frozenset(names.get(name, name) for name in self.angles),
-            names=[names.get(name, name) for name in self.names],
+            names=[names.get(name, name) + entry for name, entry in map(_entry, self.names)],
         )
 
     def estimate(self, name: str) -> str:
@@ -107,6 +107,12 @@ class FitResult:
         report["names"], report["correlation"] = self.names, _plain(self.correlation)
         report |= {"residual_rms": _plain(torch.tensor(self.residual_rms)), "samples": self.samples}
         return report | {"clipped": self.clipped, "iterations": self.iterations, "seconds": self.seconds}
+
+
+def _entry(label: str) -> tuple[str, str]:
+    """Name of a parameter, and which entry of it a label means: "[1]", or nothing."""
+    name, bracket, rest = label.partition("[")
+    return name, bracket + rest
 
 
 def in_display_unit(value: Tensor, *, angular: bool) -> Tensor:

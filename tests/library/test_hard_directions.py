@@ -49,7 +49,7 @@ FROM_COSINES = dict.fromkeys(
 NOT_BETWEEN = {
     "tabulated": "piecewise linear in three angles: in these directions several kinks meet, and any corner of them "
     "is a derivative",
-    "he_torrance, averaged spike": "the apex of the spike",
+    "he_torrance, averaged specular part": "the apex of the spike",
 }
 # One sharp cone, at light = view, and otherwise smooth: the surfaces of V-cavities whose azimuth means are exact.
 SMOOTH = [
