@@ -88,8 +88,9 @@ def test_traced_surfaces_look_like_this(name, constants, bar):
     brdf = GaussianHeightfield.from_rms_slope(held(slope), albedo=held(0.9), constants=constants)
     error = brdf.evaluate(directions)[..., 0] / truth["full_0.9"] - 1
     assert rms(all_azimuths(error)) < bar
-    direct = brdf.fields(directions)[..., 0] / truth["f1"] - 1
-    assert rms(all_azimuths(direct)) < bar / 1.5
+    direct, two = (brdf.fields(directions)[..., n] / truth[f"f{n + 1}"] - 1 for n in (0, 1))
+    assert rms(all_azimuths(direct)) < 0.0045
+    assert rms(all_azimuths(two)) < 0.025
     smith = GaussianHeightfield.from_rms_slope(held(slope), albedo=held(0.9), occlusion=held(0.0), constants=constants)
     assert rms(all_azimuths(smith.fields(directions)[..., 0] / truth["f1"] - 1)) > 5 * rms(all_azimuths(direct))
 
@@ -101,13 +102,15 @@ def test_two_scales_are_a_larger_occlusion():
         brdf = GaussianHeightfield.from_rms_slope(held(slope), occlusion=held(occlusion), constants=MESHED_HEIGHTFIELD)
         return rms(all_azimuths(brdf.fields(directions)[..., 0] / truth["f1"] - 1))
 
-    assert error(1.2) < 0.8 * error(1.0) < 0.5 * error(0.0)
+    assert error(1.6) < 0.008
+    assert error(1.0) > 0.06
+    assert error(0.0) > 0.1
 
 
 def test_without_roughness_it_is_lambert():
     directions = random_directions(200, dtype=F64, generator=torch.Generator().manual_seed(0))
     albedo = f64([0.2, 0.9])
-    for occlusion in (0.0, 1.0, 1.2):
+    for occlusion in (0.0, 1.0, 1.8):
         brdf = GaussianHeightfield(albedo=fixed(albedo), sigma=held(0.0), occlusion=held(occlusion))
         assert_close(brdf(*directions), Lambert(albedo=fixed(albedo))(*directions), rtol=4e-15, atol=0)
 
@@ -250,6 +253,24 @@ def test_tables_are_kept_while_the_parameters_stay():
     assert _kept_table.cache_info()[:2] == (2, 2)
 
 
+def test_no_derivative_is_lost_to_a_kept_table():
+    # by the roughness, of a derivative by the light: the inner transform does not see that the outer one asks
+    normal, light, view = random_directions(3, dtype=F64, generator=torch.Generator().manual_seed(9))
+    material = {"albedo": f64(0.9), "occlusion": f64(1.0), "nodes": 160, "polar_nodes": 5, "table_orders": 3}
+
+    def by_light(sigma):
+        def f(v):
+            c = Cosines.of(normal, v, view, normalize=True)
+            return gaussian_heightfield(c, sigma=sigma, **material).sum()
+
+        return torch.func.jvp(f, (light,), (torch.ones_like(light),))[1]
+
+    h, sigma = 1e-5, f64(0.6)
+    expected = (by_light(sigma + h) - by_light(sigma - h)) / (2 * h)
+    assert_close(torch.func.jvp(by_light, (sigma,), (f64(1.0),))[1], expected, rtol=1e-6, atol=1e-9)
+    assert_close(torch.func.grad(by_light)(sigma), expected, rtol=1e-6, atol=1e-9)
+
+
 def test_what_is_refused():
     with pytest.raises(ValueError, match=r"GaussianHeightfield: nodes must be one of 160, 240, 384, 560; found 200"):
         GaussianHeightfield(nodes=200)
@@ -260,8 +281,8 @@ def test_what_is_refused():
             GaussianHeightfield(bounces=bounces)
     with pytest.raises(ValueError, match=r"polar_nodes and table_orders must be at least 2; found \(1, 24\)"):
         GaussianHeightfield(polar_nodes=1)
-    with pytest.raises(ValueError, match=r"GaussianHeightfield\.occlusion must lie in \[0, 1\.2\]"):
-        GaussianHeightfield(occlusion=held(1.3))
+    with pytest.raises(ValueError, match=r"GaussianHeightfield\.occlusion must lie in \[0, 1\.8\]"):
+        GaussianHeightfield(occlusion=held(1.9))
     with pytest.raises(ValueError, match=r"from_rms_slope: rms_slope must lie in \[0, 1\.482\]"):
         GaussianHeightfield.from_rms_slope(1.5)
     with pytest.raises(ValueError, match=r"gaussian_heightfield: sigma must lie in \[0, 1\.571\] rad"):

@@ -24,6 +24,14 @@ from torchbrdf.models.heightfield.visibility import facet_masking, independence,
 UNCORRELATED = HeightfieldConstants(level=0.5, grazing=0.3, turn=1e9, grazing_turn=0.0)
 
 
+# s_1 and s_2: sin^2 of 22.5 and 67.5 degrees
+CRAIG = (math.sin(math.pi / 8) ** 2, math.cos(math.pi / 8) ** 2)
+
+
+def erfcx(x):
+    return math.exp(x * x) * math.erfc(x) if x < 5 else torch.special.erfcx(f64(x)).item()
+
+
 def gauss(low, high, panels=200):
     """Nodes and weights of 16-point panels on [low, high]."""
     x, w = np.polynomial.legendre.leggauss(16)
@@ -33,7 +41,7 @@ def gauss(low, high, panels=200):
 
 
 @pytest.mark.parametrize("constants", [MESHED_HEIGHTFIELD, SMOOTH_HEIGHTFIELD])
-@pytest.mark.parametrize("occlusion", [0.0, 0.4, 1.0, 1.2])
+@pytest.mark.parametrize("occlusion", [0.0, 0.4, 1.0, 1.2, 1.6, 1.8])
 def test_projected_area_is_exact_in_each_direction(occlusion, constants):
     # the facets that are seen fill the area the ray sees: E[X+/(1 + L)] = 1
     for t in (0.03, 0.1, 0.4, 1.0, 3.0, 10.0, 60.0):
@@ -41,16 +49,29 @@ def test_projected_area_is_exact_in_each_direction(occlusion, constants):
         xi, weight = gauss(max(-1 / t, -10.0), 10.0)
         towards = 1 + t * xi
         density = torch.exp(-xi * xi / 2) / math.sqrt(2 * math.pi)
-        seen = towards / (1 + facet_masking(towards / t, along, f64(occlusion)))
+        seen = towards / (1 + facet_masking(towards / t, along))
         assert (seen * density * weight).sum().item() == pytest.approx(1, abs=1e-9)
 
 
-def test_masking_is_negative_only_beyond_one_smooth_scale():
-    t = torch.cat((torch.zeros(1), 10 ** torch.linspace(-3, 4, 400))).to(F64)
+def test_masking_is_never_negative():
+    t = torch.cat((torch.zeros(1), 10 ** torch.linspace(-3, 6, 400))).to(F64)
     for constants in (MESHED_HEIGHTFIELD, SMOOTH_HEIGHTFIELD):
-        for occlusion, least in ((0.0, 0.0), (1.0, 0.0), (1.2, -1.1e-5)):
-            assert (ray(t, f64(occlusion), constants).masking >= least).all()
-        assert ray(t, f64(1.6), constants).masking.min() < -1e-3  # why occlusion ends at 1.2
+        for occlusion in (0.0, 0.5, 1.0, 1.2, 1.6, 1.8):
+            along = ray(t, f64(occlusion), constants)
+            assert (along.masking >= 0).all()
+            assert (along.occlusion <= occlusion + 1e-12).all()
+            assert (facet_masking(torch.linspace(0, 9, 401).to(F64), along) >= 0).all()
+
+
+def test_occlusion_is_free_up_to_one_smooth_scale():
+    # what levels it off beyond leaves Lambda of the plain form where that is positive
+    for constants in (MESHED_HEIGHTFIELD, SMOOTH_HEIGHTFIELD):
+        for nu in (0.1, 0.7, 1.5, 2.5):
+            t, g = 1 / nu, 4 / 3 * nu - constants.level + constants.grazing / nu
+            mills = [math.sqrt(math.pi / 2) * erfcx(q / math.sqrt(2)) for q in (nu, *(g / k - nu for k in CRAIG))]
+            near = sum(1 - (g / k - nu) * m for k, m in zip(CRAIG, mills[1:], strict=True))
+            plain = math.exp(-nu * nu / 2) / math.sqrt(2 * math.pi) * (t - mills[0] - t / 4 * near)
+            assert ray(f64(t), f64(1.0), constants).masking.item() == pytest.approx(plain, rel=2e-6)
 
 
 def smith_masking(theta, slope):
@@ -112,7 +133,7 @@ def test_unbalanced_bounces_keep_all_light(slope):
 def test_balanced_bounces_return_all_light(sigma, orders, bar):
     slope = rms_slope_from_sigma(f64(math.radians(sigma)))
     nodes = polar_nodes(14, slope)
-    for occlusion in (0.0, 1.0, 1.2):
+    for occlusion in (0.0, 1.0, 1.6):
         settings = (slope, f64(occlusion), SMOOTH_HEIGHTFIELD, QUADRATURES[240])
         modes = bounce_modes(*settings, polar=14, orders=orders)[:, 0].sum(0)
         total = _direct_albedo(*settings, nodes) + (modes * (nodes.solid_angle * nodes.cos)).sum(-1)

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.models.heightfield.direct import QUADRATURES, direct_light, slope_frame
+from torchbrdf.models.heightfield.direct import QUADRATURES, check_nodes, direct_light, slope_frame
 from torchbrdf.models.heightfield.roughness import RMS_SLOPE, rms_slope_from_sigma, sigma_from_rms_slope
 from torchbrdf.models.heightfield.table import TableSize, bounce_table, read_table
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
@@ -15,8 +15,8 @@ from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Interval, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 BounceCount = int | Literal["all"]
-# Beyond 1 the masking dips below 0: more facets would be seen than there are. It is -1e-5 at 1.2, -5e-3 at 1.6.
-OCCLUSION = Interval(0.0, 1.2)
+# At 2 a facet seen edge-on would never be seen.
+OCCLUSION = Interval(0.0, 1.8)
 
 
 class Settings(NamedTuple):
@@ -34,9 +34,7 @@ class Settings(NamedTuple):
 
     def check(self, name: str) -> None:
         """Raise ValueError unless the numbers make sense."""
-        if self.nodes not in QUADRATURES:
-            offered = ", ".join(map(str, QUADRATURES))
-            raise ValueError(f"{name}: nodes must be one of {offered}; found {self.nodes!r}.")
+        check_nodes(name, self.nodes)
         if min(self.size) < 2:
             raise ValueError(f"{name}: polar_nodes and table_orders must be at least 2; found {tuple(self.size)}.")
         most = self.size.orders + 1
@@ -74,14 +72,19 @@ def gaussian_heightfield(
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
         sigma: roughness, scalar or (...). [rad] in [0, pi/2]; 0 is Lambert exactly. `rms_slope_from_sigma` says
             what rms slope s it stands for.
-        occlusion: E, how much the surface near by hides, scalar or (...). [-] in [0, 1.2]; 0 is Smith's surface with
-            correlated heights, 1 a surface of one smooth scale.
+        occlusion: E, how much the surface near by hides, scalar or (...). [-] in [0, 1.8]; 0 is Smith's surface with
+            correlated heights, 1 a surface of one smooth scale, about 1.6 one of two scales.
         bounces: 1, 2, .. or "all", which is table_orders + 1.
         nodes: slopes of the direct light: 160, 240, 384 or 560.
         polar_nodes, table_orders: size of the table of bounces.
         constants: constants of the visibility.
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError outside the domains, or for other nodes or bounces.
+    Deviations: the slope integral errs by up to 7e-4, 8e-5, 4e-5, 9e-6 at 160, 240, 384, 560 nodes, the table by up to
+        1e-3 of f. White facets return 1 within 1e-3 up to 89 deg. Path-traced meshes up to 80 deg, rho = 0.9: within
+        0.3, 0.8, 1.1 % rms at s = 0.3, 0.67, 1, most of it in the bounces, which are blind to occlusion; two
+        scales at occlusion 1.6: f_1 within 0.8 %. The cone at light = view has subgradient 0. A field of sigma costs a
+        table for each entry unless bounces = 1.
     Source: own; see `docs/heightfield.md` for what it is built on.
     """
     ALBEDO.check("gaussian_heightfield: albedo", albedo)
@@ -114,6 +117,14 @@ def sum_of_orders(albedo: Tensor, fields: Tensor, first: int = 1) -> Tensor:
     return rho**first * total
 
 
+def sigma_of(name: str, rms_slope: Tensor | float | fixed) -> Tensor | fixed:
+    """Sigma of an rms slope, held fixed where the slope is; raises ValueError in the name of the slope."""
+    given = torch.as_tensor(rms_slope.value if isinstance(rms_slope, fixed) else rms_slope)
+    RMS_SLOPE.check(name, given)
+    sigma = sigma_from_rms_slope(given)
+    return fixed(sigma) if isinstance(rms_slope, fixed) else sigma
+
+
 @final
 class GaussianHeightfield(CltcSampled, BRDF):
     """Random heightfield as a module: the reference; see `gaussian_heightfield` for equation and units.
@@ -121,11 +132,13 @@ class GaussianHeightfield(CltcSampled, BRDF):
     Args:
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-]
         sigma: roughness, scalar or (...). [rad] `from_rms_slope` takes the rms slope instead.
-        occlusion: E, scalar or (...). [-] in [0, 1.2]; held at 1 unless given.
+        occlusion: E, scalar or (...). [-] in [0, 1.8]; held at 1 unless given.
         bounces, nodes, polar_nodes, table_orders, constants: as in `gaussian_heightfield`.
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError outside the domains, or for other nodes or bounces.
     """
+
+    # Stand-ins belong here: FastGaussianHeightfield, then Lambert; fewer bounces; occlusion 0.
 
     albedo: Constrained = Constrained(ALBEDO)
     sigma: Constrained = Constrained(ROUGHNESS)
@@ -164,12 +177,9 @@ class GaussianHeightfield(CltcSampled, BRDF):
         constants: HeightfieldConstants = SMOOTH_HEIGHTFIELD,
     ) -> "GaussianHeightfield":
         """Of rms slope s per axis [-] in [0, 1.482], scalar or (...), as a profilometer measures it."""
-        given = torch.as_tensor(rms_slope.value if isinstance(rms_slope, fixed) else rms_slope)
-        RMS_SLOPE.check("GaussianHeightfield.from_rms_slope: rms_slope", given)
-        sigma = sigma_from_rms_slope(given)
         return cls(
             albedo=albedo,
-            sigma=fixed(sigma) if isinstance(rms_slope, fixed) else sigma,
+            sigma=sigma_of("GaussianHeightfield.from_rms_slope: rms_slope", rms_slope),
             occlusion=occlusion,
             bounces=bounces,
             nodes=nodes,
