@@ -74,7 +74,7 @@ def components(vector: Tensor) -> Components:
 
 def dot_of(a: Components, b: Components) -> Tensor:
     """Dot product of vectors given by their components: `sum(-1)` does not fuse when compiled."""
-    return torch.addcmul(torch.addcmul(a[0] * b[0], a[1], b[1]), a[2], b[2])
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def dot(a: Tensor, b: Tensor) -> Tensor:

@@ -107,12 +107,13 @@ class Cosines:
     @classmethod
     def from_products(cls, light: Tensor, view: Tensor, phase: Tensor) -> "Cosines":
         """From the three dot products themselves (...), unchecked."""
+        light, view, phase = torch.broadcast_tensors(light, view, phase)
         above = torch.minimum(light, view) > horizon(light.dtype)
         # multiplied and added, which takes a fifth of the time of a masked fill
         lit = above.to(light.dtype)
         below = 1 - lit
         light, view, phase = (torch.addcmul(below, product, lit) for product in (light, view, phase))
-        return cls(light, view, phase, above.expand(phase.shape))
+        return cls(light, view, phase, above)
 
     @_computed_once
     def lit(self) -> Tensor:

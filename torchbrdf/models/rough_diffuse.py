@@ -88,8 +88,8 @@ class _RoughDiffuse(CltcSampled, FieldBRDF, LinearBRDF):
         r = self.roughness
         return ((1 + r * retro_term(cosines)) / (math.pi * (1 + C1 * r)),)
 
-    def reflected(self, *fields: Tensor) -> Tensor:
-        return torch.atleast_1d(self.albedo) * fields[0]
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
+        return {"direct": torch.atleast_1d(self.albedo) * fields[0]}
 
     def _direct(self) -> tuple[Tensor, Tensor, Tensor]:
         """Coefficients of 1 and of the retro term, and r, all with a trailing channel."""
@@ -175,7 +175,10 @@ class EON(_RoughDiffuse):
         r = self.roughness
         return (*super().fields(cosines), r / (math.pi * (1 + C1 * r)) * self._lost(cosines))
 
-    def reflected(self, *fields: Tensor) -> Tensor:
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
+        return super().parts_of(fields[0]) | {"interreflection": self._returned() * fields[1]}
+
+    def sum_of(self, *fields: Tensor) -> Tensor:
         rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness[..., None])
         direct, returned = fields
         return rho * (direct + rho * (average * returned) / (1 - rho * (1 - average)))

@@ -143,12 +143,17 @@ class OrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
         parts = zip(self._parts.values(), fields(cosines, self.sigma, c3=self.c3), strict=True)
         return tuple(field for included, field in parts if included)
 
-    def reflected(self, *fields: Tensor) -> Tensor:
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
         albedo = torch.atleast_1d(self.albedo)
-        if not self._parts["interreflection"]:
-            return albedo * fields[0]
-        bounced = albedo * fields[-1]
-        return albedo * (fields[0] + bounced if self._parts["direct"] else bounced)
+        parts = {"direct": lambda field: albedo * field, "interreflection": lambda field: albedo * (albedo * field)}
+        included = (name for name, wanted in self._parts.items() if wanted)
+        return {name: parts[name](field) for name, field in zip(included, fields, strict=True)}
+
+    def sum_of(self, *fields: Tensor) -> Tensor:
+        if len(fields) < 2:
+            return super().sum_of(*fields)
+        albedo, (direct, bounced) = torch.atleast_1d(self.albedo), fields
+        return albedo * (direct + albedo * bounced)
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return geometry_terms(cosines, c3=self.c3)

@@ -99,8 +99,8 @@ class QualitativeOrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
     def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return (field(cosines, self.sigma, self.a_constant),)
 
-    def reflected(self, *fields: Tensor) -> Tensor:
-        return torch.atleast_1d(self.albedo) * fields[0]
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
+        return {"direct": torch.atleast_1d(self.albedo) * fields[0]}
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return geometry_terms(cosines)
