@@ -19,6 +19,7 @@ bench: .venv/ready
 	$(BIN)/python examples/benchmarks/ladder.py --output output
 	$(BIN)/python examples/benchmarks/series.py --output output --points 131072
 	$(BIN)/python examples/benchmarks/cost_of_models.py
+	OMP_NUM_THREADS=1 $(BIN)/python examples/benchmarks/eager.py
 
 clean:
 	rm -rf .venv build output *.egg-info .pytest_cache .ruff_cache

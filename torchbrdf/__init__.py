@@ -29,6 +29,7 @@ from torchbrdf.facets import (
     v_cavities,
     v_cavity_masking,
 )
+from torchbrdf.fields import FieldBRDF
 from torchbrdf.fresnel import (
     Conductor,
     ConstantFresnel,
@@ -208,6 +209,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "FUSED_SILICA",
     "FastGaussianHeightfield",
     "FastRoughSurface",
+    "FieldBRDF",
     "Fresnel",
     "FujiiOrenNayar",
     "GGX",

@@ -14,6 +14,7 @@ from PIL import Image
 
 import torchbrdf
 from torchbrdf import BRDF
+from torchbrdf import testing as laws
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
 RECORD = EXAMPLES.parent / "docs" / "figures" / "ladder.json"
@@ -98,6 +99,24 @@ def test_every_model_is_timed(run):
     assert set(printed) == models - {"BRDF", "LinearBRDF", "ImageBRDF", "WeightedSum", "Oriented"}
     assert next(iter(printed.items())) == ("Lambert", "1")
     assert float(printed["RoughSurface"]) > float(printed["OrenNayar"])
+
+
+def test_models_are_timed_against_the_code_by_hand(run):
+    printed = run("benchmarks/eager.py", "--pixels", 64, "--repeats", 1)
+    rows = dict(line.strip("| ").split(" | ", 1) for line in printed.splitlines() if " x | " in line)
+    assert rows["by hand"].startswith("1.00 x | 1.00 x")
+    assert {"OrenNayar", "EON", "FastGaussianHeightfield"} <= rows.keys()
+
+
+def test_the_code_by_hand_is_the_functional_model(load):
+    """Away from the normal, where it has its faults."""
+    by_hand = load("benchmarks/naive.py")["naive_oren_nayar"]
+    normal, light, view = laws.random_directions(200, generator=torch.Generator().manual_seed(1))
+    sigma, albedo = torch.full((200,), 0.6), torch.tensor([0.8, 0.3]).expand(200, 2)
+    model = torchbrdf.OrenNayar(albedo=albedo[0], sigma=0.6)
+    torch.testing.assert_close(
+        by_hand(normal, light, view, sigma, albedo), model(normal, light, view), rtol=1e-3, atol=1e-4
+    )
 
 
 def test_schemes_of_the_series_are_measured_and_drawn(run, tmp_path):
