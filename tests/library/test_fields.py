@@ -1,87 +1,76 @@
-"""Models given by fields: their sum is what the images and coefficients of the same model say, and users' own work."""
+"""Models made of fields of geometry and roughness: their parts, their sum, and what a user's own becomes."""
 
 import math
 
 import pytest
 import torch
+from helpers.probes import doubles, few, held
+from torch.testing import assert_close
 
-from torchbrdf import (
-    EON,
-    Cosines,
-    FieldBRDF,
-    FujiiOrenNayar,
-    LinearBRDF,
-    OrenNayar,
-    QualitativeOrenNayar,
-)
-from torchbrdf import testing as laws
+from torchbrdf import EON, Cosines, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar
+from torchbrdf.fields import FieldBRDF
 
-D = torch.float64
-ALBEDO = torch.tensor([0.9, 0.4, 0.1], dtype=D)
-
-
-def number(value):
-    return torch.tensor(value, dtype=D)
+RHO = [0.7, 0.4, 0.1]
+MODELS = [
+    OrenNayar(albedo=held(RHO), sigma=held(0.6)),
+    OrenNayar(albedo=held(RHO), sigma=held(0.6), direct=False),
+    QualitativeOrenNayar(albedo=held(RHO), sigma=held(0.6)),
+    FujiiOrenNayar(albedo=held(RHO), roughness=held(0.6)),
+    EON(albedo=held(RHO), roughness=held(0.6)),
+]
 
 
-MODELS = {
-    "functional": lambda: OrenNayar(albedo=ALBEDO, sigma=number(0.6)),
-    "direct alone": lambda: OrenNayar(albedo=ALBEDO, sigma=number(0.6), interreflection=False),
-    "bounced alone": lambda: OrenNayar(albedo=ALBEDO, sigma=number(0.6), direct=False),
-    "without c3": lambda: OrenNayar(albedo=ALBEDO, sigma=number(0.6), c3=False),
-    "qualitative": lambda: QualitativeOrenNayar(albedo=ALBEDO, sigma=number(0.6)),
-    "Fujii": lambda: FujiiOrenNayar(albedo=ALBEDO, roughness=number(0.7)),
-    "EON": lambda: EON(albedo=ALBEDO, roughness=number(0.7)),
-    "EON, quartic": lambda: EON(albedo=ALBEDO, roughness=number(0.7), exact=False),
-}
+@pytest.mark.parametrize("brdf", MODELS, ids=lambda brdf: type(brdf).__name__)
+def test_sum_is_the_sum_of_parts_that_are_linear_in_each_field(brdf):
+    fields = [field[..., None] for field in brdf.fields(Cosines.of(*few()))]
+    assert all(field.shape == (200, 1) for field in fields)
+    parts = brdf.parts_of(*fields)
+    assert_close(brdf.sum_of(*fields), sum(parts.values()), rtol=1e-13, atol=1e-16)
+    for place, field in enumerate(fields):
+        scaled = {k: brdf.parts_of(*fields[:place], k * field, *fields[place + 1 :]) for k in (0.0, 3.0)}
+        for name, part in parts.items():
+            assert_close(scaled[3.0][name] - scaled[0.0][name], 3 * (part - scaled[0.0][name]), rtol=1e-11, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_fields_say_what_images_and_coefficients_say(name):
-    model = MODELS[name]()
-    cosines = Cosines.of(*laws.random_directions(500, dtype=D, generator=torch.Generator().manual_seed(3)))
-    assert isinstance(model, LinearBRDF)
-    by_images = (model.basis(cosines)[..., None, :] * model.coefficients()).sum(-1)
-    torch.testing.assert_close(model.evaluate(cosines), by_images, rtol=1e-13, atol=1e-15)
-    parts = model.evaluate_components(cosines)
-    assert parts.keys() == model.component_coefficients().keys()
-    for part, coefficients in zip(parts.values(), model.component_coefficients().values(), strict=True):
-        by_images = (model.basis(cosines)[..., None, :] * coefficients).sum(-1)
-        torch.testing.assert_close(cosines.zero_below_horizon(part), by_images, rtol=1e-13, atol=1e-15)
+@pytest.mark.parametrize("brdf", MODELS, ids=lambda brdf: type(brdf).__name__)
+def test_fields_say_what_images_and_coefficients_say(brdf):
+    cosines = Cosines.of(*few())
+    parts = brdf.evaluate_components(cosines)
+    assert parts.keys() == brdf.component_coefficients().keys()
+    for part, coefficients in zip(parts.values(), brdf.component_coefficients().values(), strict=True):
+        by_images = (brdf.basis(cosines)[..., None, :] * coefficients).sum(-1)
+        assert_close(cosines.zero_below_horizon(part), by_images, rtol=1e-13, atol=1e-15)
+    by_images = (brdf.basis(cosines)[..., None, :] * brdf.coefficients()).sum(-1)
+    assert_close(brdf.evaluate(cosines), by_images, rtol=1e-13, atol=1e-15)
 
 
-class Powder(FieldBRDF):
-    """A user's own: a flat field and one that grows towards the light, the albedo squared in the second."""
-
-    def __init__(self, albedo, sigma):
-        super().__init__()
-        self.albedo, self.sigma = albedo, sigma
+class Sheen(FieldBRDF):
+    """(rho + 0.1 |h|^-2)/pi with h = light + view; neither field is 0 below the horizon."""
 
     def fields(self, cosines):
-        flat = torch.full_like(cosines.light, 1 / math.pi)
-        return flat, self.sigma * cosines.phase.relu() / math.pi
+        return torch.ones_like(cosines.phase), 1 / (2 + 2 * cosines.phase)
 
-    def parts_of(self, *fields):
-        return {"flat": self.albedo * fields[0], "backward": self.albedo**2 * fields[1]}
-
-
-def test_own_model_by_fields():
-    model = Powder(ALBEDO, number(0.5))
-    drawn = torch.randn(3, 200, 3, dtype=D, generator=torch.Generator().manual_seed(4))
-    normal, light, view = torch.nn.functional.normalize(drawn, dim=-1)
-    lit = ((normal * light).sum(-1) > 0) & ((normal * view).sum(-1) > 0)
-    wanted = (ALBEDO + ALBEDO**2 * 0.5 * (light * view).sum(-1, keepdim=True).relu()) / math.pi * lit[:, None]
-    assert lit.any()
-    assert not lit.all()
-    torch.testing.assert_close(model(normal, light, view), wanted, rtol=1e-12, atol=0)
-    torch.testing.assert_close(sum(model.components(normal, light, view).values()), wanted, rtol=1e-12, atol=0)
+    def parts_of(self, flat, far):
+        return {"body": doubles(RHO) / math.pi * flat, "sheen": 0.1 / math.pi * far}
 
 
-def test_nothing_below_the_horizon_and_no_gradient():
-    model = OrenNayar(albedo=ALBEDO, sigma=number(0.6))
-    normal = torch.tensor([0.0, 0.0, 1.0], dtype=D)
-    light = torch.tensor([0.6, 0.0, -0.8], dtype=D, requires_grad=True)
-    f = model(normal, light, torch.tensor([0.0, 0.6, 0.8], dtype=D))
+def test_own_model_of_two_fields():
+    normal, light, view = few()
+    by_hand = (doubles(RHO) + 0.1 / (light + view).square().sum(-1, keepdim=True)) / math.pi
+    assert_close(Sheen()(normal, light, view), by_hand)
+    parts = Sheen().components(normal, light, view)
+    assert_close(parts["body"], (doubles(RHO) / math.pi).expand(200, 3))
+    assert_close(parts["body"] + parts["sheen"], by_hand)
+
+
+@pytest.mark.parametrize("sunk", ["light", "view"])
+def test_fields_are_dark_and_flat_below_the_horizon(sunk):
+    vectors = dict(zip(("normal", "light", "view"), few(), strict=True))
+    vectors[sunk] = -vectors[sunk]
+    vectors = {name: vector.requires_grad_() for name, vector in vectors.items()}
+    f = Sheen()(**vectors)
     assert (f == 0).all()
-    gradients = torch.autograd.grad(f.sum(), [light, *model.parameters()])
-    assert all((g == 0).all() for g in gradients)
+    slopes = torch.autograd.grad(f.sum(), list(vectors.values()), materialize_grads=True)
+    assert all((slope == 0).all() for slope in slopes)
+    for part in Sheen().components(**vectors).values():
+        assert (part == 0).all()
