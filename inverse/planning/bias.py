@@ -1,6 +1,7 @@
 """The size of a difference between two simulations: in radiance, or in the sigma a fit would find."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import torch
@@ -27,7 +28,7 @@ class RadianceDifference:
         self.reference = reference
         self.limit = tolerance
 
-    def size(self, values: Tensor, scene: Scene, model: BRDF) -> float:
+    def size(self, values: Tensor, scene: Scene, model: BRDF, names: Mapping[str, str]) -> float:
         """Of values (image, pixel, channel) against the reference."""
         return float((values - self.reference).abs().max() / self.peak)
 
@@ -70,10 +71,14 @@ class SigmaBias:
                 errors.append(noise * math.sqrt(variance) / float(lengths[place]) * abs(slope))
         self.limit = tolerance * min(errors)
 
-    def size(self, values: Tensor, scene: Scene, model: BRDF) -> float:
-        """The largest bias of any sigma; of one that the simpler model has no more, all is lost."""
+    def size(self, values: Tensor, scene: Scene, model: BRDF, names: Mapping[str, str]) -> float:
+        """The largest bias of any sigma; of one that the simpler model has no more, all is lost.
+
+        `names` are those of the given model, of parameters that have another in the simpler one.
+        """
         derivative, sigmas = self._derivative(scene, model)
-        lost = [self.values[name] for name in self.values if name not in sigmas]
+        left = {names.get(name, name) for name in sigmas}
+        lost = [value for name, value in self.values.items() if name not in left]
         if not sigmas:
             return max(lost)
         lengths = derivative.norm(dim=0)

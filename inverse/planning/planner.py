@@ -2,7 +2,8 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import torch
@@ -61,18 +62,18 @@ def plan(
     present = [entry for entry in entries if entry.absent is None]
     alone = {k.effect: watch.alone(measure, k.choice, k.apply(sample), model) for k in present}
     for option in (k for group in model.stand_ins().values() for k in group):
-        tried = watch.alone(measure, option.choice, sample, option.model)
+        tried = watch.alone(measure, option.choice, sample, option.model, option.renamed)
         alone |= {name: tried for name in option.skips if name not in alone or tried.size < alone[name].size}
 
-    def error(scene: Scene, model: BRDF) -> float:
-        return measure.size(watch.values(scene, model), scene, model)
+    def error(scene: Scene, model: BRDF, names: Mapping[str, str]) -> float:
+        return measure.size(watch.values(scene, model), scene, model, names)
 
-    stand_in, names, done = _cheapest_material(model, lambda k: error(sample, k) <= budget)
+    stand_in, names, done = _cheapest_material(model, lambda k, renamed: error(sample, k, renamed) <= budget)
     left = full
     for entry in sorted(present, key=lambda k: -alone[k.effect].saved):
         ways = sampling_options(left, stand_in) if entry.effect == FOOTPRINT else [(entry.choice, entry.apply)]
         for choice, apply in ways:
-            if error(apply(sample), stand_in) <= budget:
+            if error(apply(sample), stand_in, names) <= budget:
                 sample, left = apply(sample), apply(left)
                 done[entry.effect] = choice
                 break
@@ -87,7 +88,7 @@ def plan(
     rows = [(ruled_out | tried | also)[name] for name in listed]
     return Plan(
         scene=left, model=stand_in, names=names, effects=(*rows, *_others(full, model)),
-        of=of, tolerance=tolerance, limit=measure.limit, error=error(sample, stand_in),
+        of=of, tolerance=tolerance, limit=measure.limit, error=error(sample, stand_in, names),
         safety=safety, pilot=int(chosen.sum()),
     )  # fmt: skip
 
@@ -113,10 +114,17 @@ class _Watch:
         with torch.no_grad():
             return render(scene, model)[:, self.pixels]
 
-    def alone(self, measure: RadianceDifference | SigmaBias, choice: str, scene: Scene, model: BRDF) -> _Tried:
-        """A simpler simulation against the reference."""
+    def alone(
+        self,
+        measure: RadianceDifference | SigmaBias,
+        choice: str,
+        scene: Scene,
+        model: BRDF,
+        names: Mapping[str, str] = MappingProxyType({}),
+    ) -> _Tried:
+        """A simpler simulation against the reference; `names`: the given model's, of parameters that have others."""
         values, seconds = self._timed(scene, model)
-        return _Tried(measure.size(values, scene, model), max(0.0, 1 - seconds / self.seconds), choice)
+        return _Tried(measure.size(values, scene, model, names), max(0.0, 1 - seconds / self.seconds), choice)
 
     def _timed(self, scene: Scene, model: BRDF) -> tuple[Tensor, float]:
         began = time.perf_counter()
@@ -124,7 +132,9 @@ class _Watch:
         return values, time.perf_counter() - began
 
 
-def _cheapest_material(model: BRDF, close: Callable[[BRDF], bool]) -> tuple[BRDF, dict[str, str], dict[str, str]]:
+def _cheapest_material(
+    model: BRDF, close: Callable[[BRDF, Mapping[str, str]], bool]
+) -> tuple[BRDF, dict[str, str], dict[str, str]]:
     """The first option of each group that stays close, on top of those taken before; what was left out, and instead.
 
     Second, of parameters that have another name in the given model, that name.
@@ -139,10 +149,10 @@ def _cheapest_material(model: BRDF, close: Callable[[BRDF], bool]) -> tuple[BRDF
         group, options = next(iter(groups.items()))
         tried.add(group)
         for option in options:
-            if close(option.model):
-                model = option.model
-                before = {name: option.renamed.get(name, name) for name in (*option.renamed, *names)}
-                names = {name: names.get(earlier, earlier) for name, earlier in before.items()}
+            before = {name: option.renamed.get(name, name) for name in (*option.renamed, *names)}
+            given = {name: names.get(earlier, earlier) for name, earlier in before.items()}
+            if close(option.model, given):
+                model, names = option.model, given
                 skipped |= dict.fromkeys(option.skips, option.choice)
                 break
 

@@ -39,6 +39,13 @@ def test_plan_of_sigma_keeps_the_sigma_of_every_part():
     assert found.simulates("part 2")
 
 
+def test_sigma_of_a_part_that_leaves_is_lost_though_another_takes_its_name():
+    scene = Scene(sphere(24, 24), [FRONT, OBLIQUE], SENSOR)
+    model = 1e-3 * TorranceSparrow(sigma=0.9) + 1.0 * OrenNayar(albedo=0.5, sigma=0.2)
+    sizes = {effect.name: effect.size for effect in plan(scene, model, 1.0, of="sigma").effects}
+    assert sizes["part 1"] >= 0.9 - 1e-6
+
+
 def test_plan_of_sigma_where_all_else_is_known():
     scene = Scene(sphere(32, 32), [FRONT, OBLIQUE], SENSOR)
     found = plan(scene, OrenNayar(albedo=fixed(0.5), sigma=0.4), 1.0, of="sigma")
