@@ -16,7 +16,8 @@ from torchbrdf import (
     rms_slope_from_sigma,
     sigma_from_rms_slope,
 )
-from torchbrdf.models.heightfield.direct import QUADRATURES, Quadrature, direct_light, slope_frame
+from torchbrdf.models.heightfield.direct import QUADRATURES, Quadrature, direct_light
+from torchbrdf.models.heightfield.slope_frame import slope_frame
 from torchbrdf.models.heightfield.transport import _direct_albedo, _smith_modes, bounce_modes, polar_nodes
 from torchbrdf.models.heightfield.visibility import facet_masking, independence, joint_masking, ray
 
