@@ -169,7 +169,9 @@ class Cosines:
         tangent = orthonormal_tangent(normal, self.tangent)
         bitangent = cross(normal, tangent)
         below = ~self.above_horizon
-        parts = [dot(along, direction) for direction in directions for along in (tangent, bitangent)]
+        # n x s is s turned by 90 degrees about the normal: exactly 0 where both are one
+        turned = [cross(normal, direction) for direction in directions]
+        parts = [part for t in turned for part in (dot(bitangent, t), -dot(tangent, t))]
         return TangentPlane(*(part.masked_fill(below, 0.0) for part in parts))
 
     @_computed_once

@@ -9,7 +9,8 @@ from numpy.polynomial import chebyshev
 from torch import Tensor
 
 from torchbrdf import SMOOTH_HEIGHTFIELD, Cosines, rms_slope_from_sigma
-from torchbrdf.models.heightfield.direct import QUADRATURES, direct_light, slope_frame
+from torchbrdf.models.heightfield.direct import QUADRATURES, direct_light
+from torchbrdf.models.heightfield.slope_frame import slope_frame
 from torchbrdf.models.heightfield.table import TableSize, bounce_table, read_table
 
 ROUGHEST = math.pi / 2

@@ -5,51 +5,15 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import half_turn_sine, safe_divide, soft_sqrt
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.models.heightfield.direct import QUADRATURES, SlopeFrame, check_nodes, direct_light
+from torchbrdf.models.heightfield.direct import QUADRATURES, check_nodes, direct_light
 from torchbrdf.models.heightfield.roughness import rms_slope_from_sigma
+from torchbrdf.models.heightfield.slope_frame import anisotropic_slope_frame
 from torchbrdf.models.heightfield.surface import OCCLUSION, sigma_of
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
-
-
-def anisotropic_slope_frame(cosines: Cosines, slope_x: Tensor, slope_y: Tensor) -> SlopeFrame:
-    """Of directions (...) on a surface of rms slopes s_x along the tangent and s_y across it (...).
-
-    The plane of slopes is stretched until they are isotropic. The surface is an isotropic one stretched along the
-    ground, and a stretch takes rays to rays and hides what was hidden: every quantity of visibility, the azimuth
-    between light and view among them, is that of the stretched directions. What stays is how steep a facet is.
-    """
-    along = cosines.tangent_plane
-    light = slope_x * along.light_tangent / cosines.light, slope_y * along.light_bitangent / cosines.light
-    view = slope_x * along.view_tangent / cosines.view, slope_y * along.view_bitangent / cosines.view
-    squares = [x * x + y * y for x, y in (light, view)]
-    lower = squares[0] > squares[1]  # the light is the more grazing one of the two
-    ax, ay = (torch.where(lower, p, q) for p, q in zip(light, view, strict=True))
-    bx, by = (torch.where(lower, q, p) for p, q in zip(light, view, strict=True))
-    grazing, other = (soft_sqrt(x * x + y * y) for x, y in ((ax, ay), (bx, by)))
-    sloped = ax * ax + ay * ay > 0
-    ex = safe_divide(ax, grazing, where=sloped) + (~sloped).to(ax)
-    ey = safe_divide(ay, grazing, where=sloped)
-    side = bx * ex + by * ey, by * ex - bx * ey
-    azimuth = other * other > torch.finfo(ax.dtype).tiny
-    turn = [safe_divide(part, other, where=azimuth) for part in side]
-    # The second axis points to the side where the other direction lies.
-    hand = torch.where(side[1] < 0, -1.0, 1.0).to(ax)
-    x2, y2 = slope_x * slope_x, slope_y * slope_y
-    return SlopeFrame(
-        grazing=grazing,
-        other=other,
-        other_along=side[0],
-        other_across=side[1].abs(),
-        half_turn=half_turn_sine(turn[0], turn[1]),
-        along=x2 * ex * ex + y2 * ey * ey,
-        mixed=hand * (y2 - x2) * ex * ey,
-        across=x2 * ey * ey + y2 * ex * ex,
-    )
 
 
 def anisotropic_gaussian_heightfield(

@@ -10,13 +10,17 @@ from typing import NamedTuple
 
 import torch
 from torch import Tensor
+from torch.nn.functional import threshold
 
-from torchbrdf._numerics import half_turn_sine, positive, soft_sqrt
+from torchbrdf._numerics import half_turn_sine, soft_sqrt
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD
 
 KNEE = 0.6  # [rad] of x = sigma^2/(sigma^2 + KNEE^2), the variable of s/sigma
 # t^2 below which no facet is hidden, as far as float32 can tell: phi(1/t) underflows.
 _FLAT = 0.006
+_NOTHING_HIDDEN = 1e-30  # Lambda that changes no digit; larger ones have t^2 > _FLAT
+# sin^2 sin^2 that neither direction reaches where it is hidden: s^2 <= 2.2 leaves t^2 < _FLAT for sin^2 < 1e-3.
+_NO_AZIMUTH = 1e-6
 _SCALES = (0.25, 0.5, 0.25, 0.25, 1.0, 2.0, 1.5)  # bring the coordinates to one size
 
 
@@ -48,7 +52,7 @@ def coordinates(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor
     masking_i, steep_i = _smith(t2_i)
     masking_r, steep_r = _smith(t2_r)
     both, product = masking_i + masking_r, masking_i * masking_r
-    inverse = torch.rsqrt(positive(sine2_i * sine2_r))  # at the normal there is no azimuth, and nothing to mask
+    inverse = torch.rsqrt((sine2_i * sine2_r).clamp(min=_NO_AZIMUTH))
     half_turn = half_turn_sine(in_plane * inverse, azimuth_sine * inverse)
     z = half_turn * (SMOOTH_HEIGHTFIELD.turn + SMOOTH_HEIGHTFIELD.grazing_turn * torch.rsqrt(steep_i + steep_r))
     turn = z / (1 + z)
@@ -75,4 +79,5 @@ def _smith(t2: Tensor) -> tuple[Tensor, Tensor]:
     steep = 1 / t2.clamp(min=_FLAT)
     root = steep.sqrt()
     masking = torch.exp(-0.5 * steep) / (math.sqrt(2 * math.pi) * root) - 0.5 * torch.erfc(math.sqrt(0.5) * root)
-    return masking.relu(), steep  # a difference of two terms whose rounding may leave it below 0
+    # Exactly 0 next to the normal: what the azimuth's derivative, which grows there, is multiplied by.
+    return threshold(masking, _NOTHING_HIDDEN, 0.0), steep

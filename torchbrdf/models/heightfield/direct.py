@@ -16,8 +16,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import half_turn_sine, horizon, safe_divide
-from torchbrdf.directions import Cosines
+from torchbrdf._numerics import horizon
+from torchbrdf.models.heightfield.slope_frame import SlopeFrame
 from torchbrdf.models.heightfield.visibility import (
     HeightfieldConstants,
     facet_masking,
@@ -29,6 +29,10 @@ from torchbrdf.quadrature import gauss_legendre
 
 # Bytes of an array worked on at a time: what stays in a core's cache.
 _BYTES_AT_A_TIME = 262144
+
+# Distance of the directions over that of the more grazing one from the origin: nearer, where the split turns round
+# within it, its derivative would be the rule's error over the distance.
+_ONE_RAY = 1e-3
 
 
 class Quadrature(NamedTuple):
@@ -52,22 +56,6 @@ def check_nodes(name: str, nodes: int) -> None:
     """Raise ValueError unless there is a quadrature of so many nodes."""
     if nodes not in QUADRATURES:
         raise ValueError(f"{name}: nodes must be one of {', '.join(map(str, QUADRATURES))}; found {nodes!r}.")
-
-
-class SlopeFrame(NamedTuple):
-    """Two directions in the plane of slopes over their rms, each (...), and how steep a slope vector is. [-]
-
-    The squared steepness of the slope (x, y) is along x^2 + 2 mixed x y + across y^2.
-    """
-
-    grazing: Tensor  # t_a, of the more grazing direction: its distance from the origin
-    other: Tensor  # t_b <= t_a
-    other_along: Tensor  # t_b cos(dphi)
-    other_across: Tensor  # t_b |sin(dphi)|
-    half_turn: Tensor  # sin(dphi/2)
-    along: Tensor
-    mixed: Tensor
-    across: Tensor
 
 
 def direct_light(
@@ -123,6 +111,7 @@ def _across(frame: SlopeFrame, quadrature: Quadrature) -> tuple[Tensor, Tensor]:
     largest = torch.maximum(apart, sideways)
     flat = largest <= 0
     share = torch.minimum(apart, sideways).masked_fill(flat, 0.0) / largest.masked_fill(flat, 1.0)
+    share = torch.where(largest <= _ONE_RAY * frame.grazing, share.detach(), share)
     split = -torch.asinh(quadrature.reach * share)
     end = math.asinh(quadrature.reach)
     node, weight = gauss_legendre(quadrature.across, split)
@@ -163,26 +152,3 @@ def _whole_rule(quadrature: Quadrature) -> float:
 def _whole(quadrature: Quadrature) -> float:
     """Integral of exp(-x^2/2) over the reach by the rule along x."""
     return _whole_rule(quadrature)
-
-
-def slope_frame(cosines: Cosines, slope: Tensor) -> SlopeFrame:
-    """Of directions (...) on an isotropic surface of rms slope s (...)."""
-    product = cosines.sin_alpha * cosines.sin_beta
-    sloped = product > 0  # a ray along the normal has no azimuth, and nothing depends on it
-    # Tangents of the other direction along and across the grazing one, without its sine: smooth at its normal.
-    below = cosines.sin_alpha * cosines.beta
-    steep = cosines.sin_alpha > 0
-    along = safe_divide(cosines.in_plane, below, where=steep)
-    across = safe_divide(cosines.azimuth_sine, below, where=steep)
-    turn = [safe_divide(part, product, where=sloped) for part in (cosines.in_plane, cosines.azimuth_sine)]
-    squared = slope * slope
-    return SlopeFrame(
-        grazing=slope * cosines.sin_alpha / cosines.alpha,
-        other=slope * cosines.sin_beta / cosines.beta,
-        other_along=slope * along,
-        other_across=slope * across,
-        half_turn=half_turn_sine(*turn),
-        along=squared,
-        mixed=torch.zeros_like(squared),
-        across=squared,
-    )

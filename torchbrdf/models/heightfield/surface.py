@@ -7,8 +7,9 @@ from torch import Tensor
 
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.models.heightfield.direct import QUADRATURES, check_nodes, direct_light, slope_frame
+from torchbrdf.models.heightfield.direct import QUADRATURES, check_nodes, direct_light
 from torchbrdf.models.heightfield.roughness import RMS_SLOPE, rms_slope_from_sigma, sigma_from_rms_slope
+from torchbrdf.models.heightfield.slope_frame import slope_frame
 from torchbrdf.models.heightfield.table import TableSize, bounce_table, read_table
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Interval, fixed

@@ -12,10 +12,11 @@ import torch
 from torch import Tensor
 from torch.autograd import forward_ad
 
-from torchbrdf._numerics import angle_over_sine, safe_sqrt
+from torchbrdf._numerics import angle_over_sine
 from torchbrdf.directions import Cosines
 from torchbrdf.models.heightfield.direct import Quadrature
 from torchbrdf.models.heightfield.roughness import rms_slope_from_sigma
+from torchbrdf.models.heightfield.slope_frame import tangents
 from torchbrdf.models.heightfield.transport import bounce_modes, polar_nodes
 from torchbrdf.models.heightfield.visibility import HeightfieldConstants
 from torchbrdf.quadrature import gauss_legendre
@@ -92,7 +93,9 @@ def read_table(cosines: Cosines, table: Tensor, size: TableSize) -> Tensor:
     """F_n (..., orders) [1/sr] at directions (...), of a table (..., polar^2, 2 orders)."""
     table = table.to(cosines.light.dtype)
     shape = torch.broadcast_shapes(cosines.light.shape, table.shape[:-2])
-    fields = torch.stack((cosines.light, cosines.view, cosines.in_plane))
+    both = zip(tangents(cosines), (cosines.light, cosines.view), strict=True)
+    angles = [tangent * cosine * angle_over_sine(cosine) for tangent, cosine in both]
+    fields = torch.stack((*angles, cosines.in_plane))
     if table.ndim > 2 or torch.compiler.is_compiling() or shape.numel() <= _PIXELS_AT_A_TIME:
         return _read(fields, table, size)
     pieces = fields.flatten(1).split(_PIXELS_AT_A_TIME, 1)
@@ -100,8 +103,8 @@ def read_table(cosines: Cosines, table: Tensor, size: TableSize) -> Tensor:
 
 
 def _read(fields: Tensor, table: Tensor, size: TableSize) -> Tensor:
-    light, view, in_plane = fields
-    light, view = _rows(light, size.polar), _rows(view, size.polar)
+    theta_light, theta_view, in_plane = fields
+    light, view = (legendre(theta * (4 / math.pi) - 1, size.polar) for theta in (theta_light, theta_view))
     products = (light[..., :, None] * view[..., None, :]).flatten(-2)
     if table.ndim == 2:
         orders = products @ table
@@ -109,8 +112,3 @@ def _read(fields: Tensor, table: Tensor, size: TableSize) -> Tensor:
         orders = (products[..., None, :] @ table)[..., 0, :]
     flat, turned = orders.split(size.orders, -1)
     return flat + in_plane[..., None] * turned
-
-
-def _rows(cosine: Tensor, count: int) -> Tensor:
-    theta = safe_sqrt((1 - cosine) * (1 + cosine)) * angle_over_sine(cosine)
-    return legendre(theta * (4 / math.pi) - 1, count)

@@ -22,7 +22,8 @@ import torch
 from torch import Tensor
 
 from torchbrdf._numerics import safe_divide, safe_sqrt
-from torchbrdf.models.heightfield.direct import Quadrature, SlopeFrame, direct_light
+from torchbrdf.models.heightfield.direct import Quadrature, direct_light
+from torchbrdf.models.heightfield.slope_frame import SlopeFrame
 from torchbrdf.models.heightfield.visibility import HeightfieldConstants, ray
 from torchbrdf.quadrature import gauss_legendre
 
