@@ -1,8 +1,8 @@
 """The rows of the random heightfields."""
 
-from materials import Model, colour, number
+from materials import Model, brushed, colour, number
 
-from torchbrdf import FastGaussianHeightfield, GaussianHeightfield, fixed
+from torchbrdf import AnisotropicGaussianHeightfield, FastGaussianHeightfield, GaussianHeightfield, fixed
 
 # The masking of two rays has a kink where they coincide, which no panel's end follows off the plane of the view.
 CONE = 5e-5
@@ -65,5 +65,16 @@ HEIGHTFIELD = [
         "fast gaussian heightfield, fixed sigma = 0",
         lambda dtype: FastGaussianHeightfield(albedo=colour(dtype), sigma=fixed(number(0.0, dtype))),
         captured=False,
+    ),
+    Model(
+        "anisotropic gaussian heightfield",
+        lambda dtype: brushed(
+            AnisotropicGaussianHeightfield(
+                albedo=colour(dtype), sigma_x=number(0.3, dtype), sigma_y=number(0.7, dtype), nodes=160
+            ),
+            dtype,
+        ),
+        integral=CONE,
+        float32=ROUNDED,
     ),
 ]

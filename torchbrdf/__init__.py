@@ -70,24 +70,15 @@ from torchbrdf.models.he_torrance.reflectance import (
     he_torrance,
     specular_reflectivity,
 )
-from torchbrdf.models.heightfield.fast import (
-    FastGaussianHeightfield,
-    fast_gaussian_heightfield,
-)
+from torchbrdf.models.heightfield.anisotropic import AnisotropicGaussianHeightfield, anisotropic_gaussian_heightfield
+from torchbrdf.models.heightfield.fast import FastGaussianHeightfield, fast_gaussian_heightfield
 from torchbrdf.models.heightfield.roughness import (
     rms_slope_from_beckmann_alpha,
     rms_slope_from_sigma,
     sigma_from_rms_slope,
 )
-from torchbrdf.models.heightfield.surface import (
-    GaussianHeightfield,
-    gaussian_heightfield,
-)
-from torchbrdf.models.heightfield.visibility import (
-    MESHED_HEIGHTFIELD,
-    SMOOTH_HEIGHTFIELD,
-    HeightfieldConstants,
-)
+from torchbrdf.models.heightfield.surface import GaussianHeightfield, gaussian_heightfield
+from torchbrdf.models.heightfield.visibility import MESHED_HEIGHTFIELD, SMOOTH_HEIGHTFIELD, HeightfieldConstants
 from torchbrdf.models.lambert import (
     Lambert,
 )
@@ -195,6 +186,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "ALUMINIUM",
     "AnisotropicBeckmann",
     "AnisotropicGGX",
+    "AnisotropicGaussianHeightfield",
     "AnisotropicRoughSurface",
     "AshikhminShirley",
     "BRDF",
@@ -258,6 +250,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "TorranceSparrow",
     "UnidirectionalVCavities",
     "WeightedSum",
+    "anisotropic_gaussian_heightfield",
     "any_tangent",
     "burley",
     "coherency",

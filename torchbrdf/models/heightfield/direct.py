@@ -48,6 +48,12 @@ QUADRATURES = {
 }
 
 
+def check_nodes(name: str, nodes: int) -> None:
+    """Raise ValueError unless there is a quadrature of so many nodes."""
+    if nodes not in QUADRATURES:
+        raise ValueError(f"{name}: nodes must be one of {', '.join(map(str, QUADRATURES))}; found {nodes!r}.")
+
+
 class SlopeFrame(NamedTuple):
     """Two directions in the plane of slopes over their rms, each (...), and how steep a slope vector is. [-]
 

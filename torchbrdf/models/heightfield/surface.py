@@ -7,7 +7,7 @@ from torch import Tensor
 
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
-from torchbrdf.models.heightfield.direct import QUADRATURES, direct_light, slope_frame
+from torchbrdf.models.heightfield.direct import QUADRATURES, check_nodes, direct_light, slope_frame
 from torchbrdf.models.heightfield.roughness import RMS_SLOPE, rms_slope_from_sigma, sigma_from_rms_slope
 from torchbrdf.models.heightfield.table import TableSize, bounce_table, read_table
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
@@ -34,9 +34,7 @@ class Settings(NamedTuple):
 
     def check(self, name: str) -> None:
         """Raise ValueError unless the numbers make sense."""
-        if self.nodes not in QUADRATURES:
-            offered = ", ".join(map(str, QUADRATURES))
-            raise ValueError(f"{name}: nodes must be one of {offered}; found {self.nodes!r}.")
+        check_nodes(name, self.nodes)
         if min(self.size) < 2:
             raise ValueError(f"{name}: polar_nodes and table_orders must be at least 2; found {tuple(self.size)}.")
         most = self.size.orders + 1
@@ -114,6 +112,14 @@ def sum_of_orders(albedo: Tensor, fields: Tensor, first: int = 1) -> Tensor:
     return rho**first * total
 
 
+def sigma_of(name: str, rms_slope: Tensor | float | fixed) -> Tensor | fixed:
+    """Sigma of an rms slope, held fixed where the slope is; raises ValueError in the name of the slope."""
+    given = torch.as_tensor(rms_slope.value if isinstance(rms_slope, fixed) else rms_slope)
+    RMS_SLOPE.check(name, given)
+    sigma = sigma_from_rms_slope(given)
+    return fixed(sigma) if isinstance(rms_slope, fixed) else sigma
+
+
 @final
 class GaussianHeightfield(CltcSampled, BRDF):
     """Random heightfield as a module: the reference; see `gaussian_heightfield` for equation and units.
@@ -164,12 +170,9 @@ class GaussianHeightfield(CltcSampled, BRDF):
         constants: HeightfieldConstants = SMOOTH_HEIGHTFIELD,
     ) -> "GaussianHeightfield":
         """Of rms slope s per axis [-] in [0, 1.482], scalar or (...), as a profilometer measures it."""
-        given = torch.as_tensor(rms_slope.value if isinstance(rms_slope, fixed) else rms_slope)
-        RMS_SLOPE.check("GaussianHeightfield.from_rms_slope: rms_slope", given)
-        sigma = sigma_from_rms_slope(given)
         return cls(
             albedo=albedo,
-            sigma=fixed(sigma) if isinstance(rms_slope, fixed) else sigma,
+            sigma=sigma_of("GaussianHeightfield.from_rms_slope: rms_slope", rms_slope),
             occlusion=occlusion,
             bounces=bounces,
             nodes=nodes,
