@@ -88,8 +88,9 @@ def test_traced_surfaces_look_like_this(name, constants, bar):
     brdf = GaussianHeightfield.from_rms_slope(held(slope), albedo=held(0.9), constants=constants)
     error = brdf.evaluate(directions)[..., 0] / truth["full_0.9"] - 1
     assert rms(all_azimuths(error)) < bar
-    direct = brdf.fields(directions)[..., 0] / truth["f1"] - 1
-    assert rms(all_azimuths(direct)) < bar / 1.5
+    direct, two = (brdf.fields(directions)[..., n] / truth[f"f{n + 1}"] - 1 for n in (0, 1))
+    assert rms(all_azimuths(direct)) < 0.0045
+    assert rms(all_azimuths(two)) < 0.025
     smith = GaussianHeightfield.from_rms_slope(held(slope), albedo=held(0.9), occlusion=held(0.0), constants=constants)
     assert rms(all_azimuths(smith.fields(directions)[..., 0] / truth["f1"] - 1)) > 5 * rms(all_azimuths(direct))
 
@@ -248,6 +249,24 @@ def test_tables_are_kept_while_the_parameters_stay():
     brdf(*directions).sum().backward()  # a table with derivatives is made anew
     brdf(*directions).sum().backward()
     assert _kept_table.cache_info()[:2] == (2, 2)
+
+
+def test_no_derivative_is_lost_to_a_kept_table():
+    # by the roughness, of a derivative by the light: the inner transform does not see that the outer one asks
+    normal, light, view = random_directions(3, dtype=F64, generator=torch.Generator().manual_seed(9))
+    material = {"albedo": f64(0.9), "occlusion": f64(1.0), "nodes": 160, "polar_nodes": 5, "table_orders": 3}
+
+    def by_light(sigma):
+        def f(v):
+            c = Cosines.of(normal, v, view, normalize=True)
+            return gaussian_heightfield(c, sigma=sigma, **material).sum()
+
+        return torch.func.jvp(f, (light,), (torch.ones_like(light),))[1]
+
+    h, sigma = 1e-5, f64(0.6)
+    expected = (by_light(sigma + h) - by_light(sigma - h)) / (2 * h)
+    assert_close(torch.func.jvp(by_light, (sigma,), (f64(1.0),))[1], expected, rtol=1e-6, atol=1e-9)
+    assert_close(torch.func.grad(by_light)(sigma), expected, rtol=1e-6, atol=1e-9)
 
 
 def test_what_is_refused():

@@ -83,6 +83,11 @@ def gaussian_heightfield(
         constants: constants of the visibility.
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError outside the domains, or for other nodes or bounces.
+    Deviations: the slope integral errs by up to 7e-4, 8e-5, 4e-5, 9e-6 at 160, 240, 384, 560 nodes, the table by up to
+        1e-3 of f. White facets return 1 within 1e-3 up to 89 deg. Path-traced meshes up to 80 deg, rho = 0.9: within
+        0.3, 0.8, 1.1 % rms at s = 0.3, 0.67, 1, most of it in the bounces, which are blind to occlusion. Beyond
+        occlusion 1 up to 1e-5 more facets are seen than there are. The cone at light = view has subgradient 0. A field
+        of sigma costs a table for each entry unless bounces = 1.
     Source: own; see `docs/heightfield.md` for what it is built on.
     """
     ALBEDO.check("gaussian_heightfield: albedo", albedo)
@@ -135,6 +140,8 @@ class GaussianHeightfield(CltcSampled, BRDF):
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError outside the domains, or for other nodes or bounces.
     """
+
+    # Stand-ins belong here: FastGaussianHeightfield, then Lambert; fewer bounces; occlusion 0.
 
     albedo: Constrained = Constrained(ALBEDO)
     sigma: Constrained = Constrained(ROUGHNESS)

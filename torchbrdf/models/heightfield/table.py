@@ -48,12 +48,10 @@ def _plain(value: Tensor) -> float | None:
     """The number in a tensor that holds one and whose derivatives are not asked for, else None."""
     if torch.compiler.is_compiling() or value.numel() != 1 or (value.requires_grad and torch.is_grad_enabled()):
         return None
-    if forward_ad.unpack_dual(value).tangent is not None:
+    # A transform of torch.func, of any depth, or a plain dual tensor may ask for derivatives unseen.
+    if torch.func.debug_unwrap(value) is not value or forward_ad.unpack_dual(value).tangent is not None:
         return None
-    try:
-        return value.item()
-    except RuntimeError:  # a batched tensor inside torch.func.vmap cannot be read
-        return None
+    return value.item()
 
 
 @lru_cache(maxsize=32)
