@@ -1,4 +1,4 @@
-"""Heightfields state their stand-ins; the planner takes them; the ladder against heightfields says how good they are."""
+"""Heightfields state their stand-ins; the planner takes them; the ladder against them says how good each rung is."""
 
 import pytest
 import torch
