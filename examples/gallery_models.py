@@ -40,6 +40,11 @@ MODELS = {
     "AnisotropicRoughSurface\nsigma 45 deg along x, 10 deg along y": brushed(
         tb.AnisotropicRoughSurface(**RHO, sigma_x=math.radians(45), sigma_y=math.radians(10), nodes=8, azimuths=12)
     ),
+    "FastGaussianHeightfield\nsigma 30 deg": tb.FastGaussianHeightfield(**RHO, **SIGMA),
+    "GaussianHeightfield\nsigma 30 deg": tb.GaussianHeightfield(**RHO, **SIGMA),
+    "AnisotropicGaussianHeightfield\nsigma 45 deg along x, 10 deg along y": brushed(
+        tb.AnisotropicGaussianHeightfield(**RHO, sigma_x=math.radians(45), sigma_y=math.radians(10))
+    ),
     "SingleSlopeVCavities\nslope 35 deg": tb.SingleSlopeVCavities(**RHO, **SLOPE),
     "ClosedFormVCavities\nslope 35 deg": tb.ClosedFormVCavities(**RHO, **SLOPE),
     "UnidirectionalVCavities\nslope 35 deg, upright grooves": brushed(tb.UnidirectionalVCavities(**RHO, **SLOPE)),

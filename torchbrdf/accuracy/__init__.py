@@ -1,5 +1,11 @@
 """What accuracy costs: ladders of models against their references, in error, time and memory."""
 
+from torchbrdf.accuracy.conversions import (
+    eon_roughness_from_sigma,
+    fitted_roughness,
+    fujii_roughness_from_sigma,
+)
+from torchbrdf.accuracy.heightfields import DIFFUSE_RUNGS, heightfield_reference
 from torchbrdf.accuracy.ladders import (
     RUNGS,
     Ladder,
@@ -26,6 +32,7 @@ from torchbrdf.accuracy.series import (
 )
 
 __all__ = [
+    "DIFFUSE_RUNGS",
     "RUNGS",
     "SCHEMES",
     "Ladder",
@@ -35,8 +42,12 @@ __all__ = [
     "SeriesRow",
     "converged",
     "cost",
+    "eon_roughness_from_sigma",
     "expanded",
+    "fitted_roughness",
     "forward_ratios",
+    "fujii_roughness_from_sigma",
+    "heightfield_reference",
     "interleaved_medians",
     "ladder",
     "reference",

@@ -8,9 +8,11 @@ from typing import NamedTuple, final
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import BRDF
+from torchbrdf import effects
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import Cosines
 from torchbrdf.models.heightfield.coordinates import Coordinates, coordinates, slope_squared
+from torchbrdf.models.rungs import Member, lambert, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
@@ -165,3 +167,11 @@ class FastGaussianHeightfield(CltcSampled, BRDF):
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
         return reflectance(self.albedo, self.fields(cosines))
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model."""
+        simulates = (effects.ROUGHNESS, effects.INTERREFLECTION, effects.LATER_BOUNCES, effects.OCCLUSION_NEAR_BY)
+        return [lambert(self), Member("fast heightfield", simulates, self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        return stand_ins(self.members())

@@ -5,14 +5,17 @@ from typing import Literal, NamedTuple, final
 import torch
 from torch import Tensor
 
-from torchbrdf.brdf import BRDF
+from torchbrdf import effects
+from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import Cosines
 from torchbrdf.models.heightfield.direct import QUADRATURES, check_nodes, direct_light
+from torchbrdf.models.heightfield.fast import FastGaussianHeightfield
 from torchbrdf.models.heightfield.roughness import RMS_SLOPE, rms_slope_from_sigma, sigma_from_rms_slope
 from torchbrdf.models.heightfield.slope_frame import slope_frame
 from torchbrdf.models.heightfield.table import TableSize, bounce_table, read_table
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Interval, fixed
+from torchbrdf.models.rungs import Member, stand_ins
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Interval, fixed, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 BounceCount = int | Literal["all"]
@@ -204,3 +207,42 @@ class GaussianHeightfield(CltcSampled, BRDF):
         slices = {"direct": slice(0, 1), "two_bounce": slice(1, 2), "higher": slice(2, None)}
         parts = {name: (fields[..., part], 1 + (part.start or 0)) for name, part in slices.items()}
         return {name: sum_of_orders(self.albedo, f, first) for name, (f, first) in parts.items() if f.shape[-1]}
+
+    def members(self) -> list[Member]:
+        """The ladder up to this model: the fit (of occlusion 1), fewer bounces, and of each number fewer nodes."""
+        own = self.settings
+        near_by = (effects.OCCLUSION_NEAR_BY,) if self.occlusion.any() else ()
+        members = FastGaussianHeightfield(albedo=kept(self, "albedo"), sigma=kept(self, "sigma")).members()
+        last = own.orders + 1
+        for count in (*(few for few in (1, 2) if few < last), last):
+            followed = (effects.INTERREFLECTION, effects.LATER_BOUNCES)[: count - 1]
+            simulates = (effects.ROUGHNESS, *followed, *near_by, effects.EXACT_SLOPES)
+            every = own.bounces == "all" and count == last
+            label = "all bounces" if every else f"{count} bounce" if count == 1 else f"{count} bounces"
+            for nodes in (*(fewer for fewer in QUADRATURES if fewer < own.nodes), own.nodes):
+                names = (*simulates, effects.MANY_SLOPES) if nodes == own.nodes else simulates
+                model = self._simplified(kept(self, "occlusion"), bounces=count, nodes=nodes)
+                members.append(Member(f"heightfield, {nodes} nodes, {label}", names, model))
+        return [*members[:-1], members[-1]._replace(model=self)]
+
+    def stand_ins(self) -> dict[str, list[Option]]:
+        """Rungs of the ladder, and beside them Smith's surface: the same without the occlusion near by."""
+        rungs = stand_ins(self.members())
+        if not self.occlusion.any():
+            return rungs
+        own = self.settings
+        smith = self._simplified(fixed(torch.zeros_like(self.occlusion)), bounces=own.bounces, nodes=own.nodes)
+        return rungs | {effects.OCCLUSION_NEAR_BY: [Option("Smith", (effects.OCCLUSION_NEAR_BY,), smith)]}
+
+    def _simplified(self, occlusion: Tensor | fixed, *, bounces: BounceCount, nodes: int) -> "GaussianHeightfield":
+        own = self.settings
+        return GaussianHeightfield(
+            albedo=kept(self, "albedo"),
+            sigma=kept(self, "sigma"),
+            occlusion=occlusion,
+            bounces=bounces,
+            nodes=nodes,
+            polar_nodes=own.size.polar,
+            table_orders=own.size.orders,
+            constants=own.constants,
+        )

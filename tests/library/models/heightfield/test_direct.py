@@ -9,7 +9,8 @@ from helpers.heightfields import F64, UNCORRELATED, cosines, f64, golden, held, 
 from torch.testing import assert_close
 
 from torchbrdf import MESHED_HEIGHTFIELD, GaussianHeightfield, gaussian_heightfield, sigma_from_rms_slope
-from torchbrdf.models.heightfield.direct import Quadrature, direct_light, slope_frame
+from torchbrdf.models.heightfield.direct import Quadrature, direct_light
+from torchbrdf.models.heightfield.slope_frame import slope_frame
 
 
 @pytest.mark.parametrize(
