@@ -5,7 +5,7 @@ import math
 import torch
 
 from torchbrdf import fixed
-from torchbrdf.testing import laws
+from torchbrdf import testing as laws
 
 COS = [0.05, 0.3, 0.8, 1.0]
 

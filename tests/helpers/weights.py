@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf import BRDF, Oriented
-from torchbrdf.testing import laws
+from torchbrdf import testing as laws
 
 
 class Weights(NamedTuple):

@@ -6,7 +6,7 @@ import torch
 from helpers.catalog import MODELS
 
 from torchbrdf import OrenNayar
-from torchbrdf.testing import laws
+from torchbrdf import testing as laws
 
 
 def test_directional_albedo_agrees_with_another_quadrature(model):

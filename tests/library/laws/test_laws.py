@@ -4,7 +4,7 @@ import pytest
 import torch
 from helpers.catalog import MODELS
 
-from torchbrdf.testing import laws
+from torchbrdf import testing as laws
 
 TOLERANCE = laws.TOLERANCE
 HARD = list(laws.hard_directions())

@@ -12,9 +12,9 @@ from torchbrdf import (
     fixed,
     gaussian_weights,
 )
+from torchbrdf import testing as laws
 from torchbrdf.models.oren_nayar.converged import converged
 from torchbrdf.models.oren_nayar.slope_plane import slope_plane_from_angles
-from torchbrdf.testing import laws
 
 
 def test_tabulated_gaussian_is_the_gaussian():
