@@ -12,7 +12,7 @@ from helpers.materials import Model
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from torchbrdf import BRDF, Oriented
+from torchbrdf import BRDF, AnisotropicGaussianHeightfield, Oriented
 from torchbrdf.testing import Directions
 
 FRAMES = 4
@@ -95,6 +95,8 @@ def sharpened(brdf: BRDF) -> BRDF:
     for name, value in (("order", 20), ("graded", True)):
         if hasattr(inner, name):
             setattr(inner, name, value)
+    if isinstance(inner, AnisotropicGaussianHeightfield):
+        inner.nodes = 560  # they turn with the more grazing direction, at once next to the normal
     return brdf
 
 
