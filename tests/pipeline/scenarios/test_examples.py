@@ -144,7 +144,7 @@ def test_gallery_leaves_no_model_out(load):
     shown = {type(part).__name__ for model in gallery.values() for part in model.modules()}
     library = {name for name in torchbrdf.__all__ if isinstance(getattr(torchbrdf, name), type)}
     models = {name for name in library if issubclass(getattr(torchbrdf, name), BRDF)}
-    assert models - shown <= {"BRDF", "ImageBRDF", "LinearBRDF"}
+    assert models - shown <= {"BRDF", "FieldBRDF", "ImageBRDF", "LinearBRDF"}
 
 
 def test_he_torrance_figures_say_which_claims_hold(run, tmp_path):

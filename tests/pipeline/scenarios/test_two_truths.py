@@ -12,7 +12,7 @@ import pytest
 
 from torchbrdf.accuracy import DIFFUSE_RUNGS
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples"
 RECORD = json.loads((ROOT / "docs" / "figures" / "ladder_two_truths.json").read_text())
 ACCURACY = (ROOT / "docs" / "accuracy.md").read_text()

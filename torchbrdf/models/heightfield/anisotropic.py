@@ -12,7 +12,7 @@ from torchbrdf.models.heightfield.roughness import rms_slope_from_sigma
 from torchbrdf.models.heightfield.slope_frame import anisotropic_slope_frame
 from torchbrdf.models.heightfield.surface import OCCLUSION, sigma_of
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 
@@ -48,8 +48,8 @@ def anisotropic_gaussian_heightfield(
     Raises: ValueError outside the domains, for other nodes, and without a tangent.
     Deviations: two and more bounces are left out. Exact only where both slopes come from one stretch: a surface whose
         correlation does not follow its slopes shares visibility otherwise.
-    Source: stretch: Heitz 2014, Understanding the Masking-Shadowing Function in Microfacet-Based BRDFs, JCGT 3(2);
-        visibility: own.
+    Source: stretch: Heitz 2014, Understanding the masking-shadowing function in microfacet-based BRDFs, JCGT 3(2),
+        48-107; visibility: own.
     """
     name = "anisotropic_gaussian_heightfield"
     ALBEDO.check(f"{name}: albedo", albedo)
@@ -85,10 +85,10 @@ class AnisotropicGaussianHeightfield(CltcSampled, BRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma_x: Tensor | float | fixed = 0.3,
-        sigma_y: Tensor | float | fixed = 0.3,
-        occlusion: Tensor | float | fixed = fixed(1.0),  # noqa: B008 - frozen
+        albedo: ParameterValue = 0.5,
+        sigma_x: ParameterValue = 0.3,
+        sigma_y: ParameterValue = 0.3,
+        occlusion: ParameterValue = fixed(1.0),  # noqa: B008 - frozen
         nodes: int = 240,
         constants: HeightfieldConstants = SMOOTH_HEIGHTFIELD,
     ):
@@ -104,11 +104,11 @@ class AnisotropicGaussianHeightfield(CltcSampled, BRDF):
     @classmethod
     def from_rms_slopes(
         cls,
-        rms_slope_x: Tensor | float | fixed,
-        rms_slope_y: Tensor | float | fixed,
+        rms_slope_x: ParameterValue,
+        rms_slope_y: ParameterValue,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        occlusion: Tensor | float | fixed = fixed(1.0),  # noqa: B008 - frozen
+        albedo: ParameterValue = 0.5,
+        occlusion: ParameterValue = fixed(1.0),  # noqa: B008 - frozen
         nodes: int = 240,
         constants: HeightfieldConstants = SMOOTH_HEIGHTFIELD,
     ) -> "AnisotropicGaussianHeightfield":

@@ -13,7 +13,7 @@ from torchbrdf.brdf import BRDF, Option
 from torchbrdf.directions import Cosines
 from torchbrdf.models.heightfield.coordinates import Coordinates, coordinates, slope_squared
 from torchbrdf.models.rungs import Member, lambert, stand_ins
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, fixed
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 # Bytes of one field worked on at a time: a few dozen of them stay in a core's cache.
@@ -73,19 +73,19 @@ def heightfield_fields(cosines: Cosines, sigma: Tensor) -> HeightfieldFields:
 
 
 def _fields(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor, sigma: Tensor) -> HeightfieldFields:
-    found = coordinates(light, view, phase, azimuth_sine, slope_squared(sigma, _FIT.slope))
-    return fields_from(found, Network(*(t.to(found.features) for t in _FIT.network)))
+    place = coordinates(light, view, phase, azimuth_sine, slope_squared(sigma, _FIT.slope))
+    return fields_from(place, Network(*(t.to(place.features) for t in _FIT.network)))
 
 
-def fields_from(found: Coordinates, network: Network) -> HeightfieldFields:
+def fields_from(place: Coordinates, network: Network) -> HeightfieldFields:
     """The fields (n,) of coordinates (7, n), (n,), (n,)."""
     n = network
-    hidden = _bounded(torch.addmm(n.first_bias, n.first, found.features)) - _bounded(n.first_bias)
+    hidden = _bounded(torch.addmm(n.first_bias, n.first, place.features)) - _bounded(n.first_bias)
     hidden = _bounded(torch.addmm(n.second_bias, n.second, hidden)) - _bounded(n.second_bias)
     direct, two, third, kept = torch.addmm(n.last_bias, n.last, hidden).unbind(0)
-    share = found.share
+    share = place.share
     return HeightfieldFields(
-        found.masked * (direct.exp() / math.pi),
+        place.masked * (direct.exp() / math.pi),
         share * two.exp(),
         share * share * third.exp(),
         _LARGEST_KEPT * _bounded(kept),
@@ -153,7 +153,7 @@ class FastGaussianHeightfield(CltcSampled, BRDF):
     albedo: Constrained = Constrained(ALBEDO)
     sigma: Constrained = Constrained(ROUGHNESS)
 
-    def __init__(self, *, albedo: Tensor | float | fixed = 0.5, sigma: Tensor | float | fixed = 0.3):
+    def __init__(self, *, albedo: ParameterValue = 0.5, sigma: ParameterValue = 0.3):
         super().__init__()
         self.albedo = albedo
         self.sigma = sigma

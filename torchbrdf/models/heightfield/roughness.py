@@ -15,10 +15,10 @@ from functools import lru_cache
 import numpy as np
 import torch
 from numpy.polynomial import Chebyshev
-from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
 from torchbrdf.parameters import ROUGHNESS, Interval
+from torchbrdf.quadrature import gauss_legendre_rule
 
 _DEGREE = 64  # of the series: their last coefficients are below 1e-13
 _KNEE = 0.8  # of both variables: the smallest coefficients for both series
@@ -29,9 +29,9 @@ _NEWTON_STEPS = 12
 
 def _mean_square_angle_of_slopes(slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """E[theta^2] of Gaussian slopes of rms `slope` per axis, and its derivative by the slope. [rad^2]"""
-    x, w = leggauss(_NODES)
-    u = (x + 1) / 2 * np.arcsinh(_WIDTH)  # r = sinh(u) moves the poles of atan(s r) away from the axis
-    r, weight = np.sinh(u), w * np.arcsinh(_WIDTH) / 2 * np.cosh(u)
+    x, w = (np.array(rule) for rule in gauss_legendre_rule(_NODES))
+    u = x * np.arcsinh(_WIDTH)  # r = sinh(u) moves the poles of atan(s r) away from the axis
+    r, weight = np.sinh(u), w * np.arcsinh(_WIDTH) * np.cosh(u)
     mass = weight * r * np.exp(-r * r / 2)
     steep = slope[:, None] * r
     return (mass * np.arctan(steep) ** 2).sum(-1), (mass * 2 * np.arctan(steep) * r / (1 + steep**2)).sum(-1)
@@ -39,9 +39,9 @@ def _mean_square_angle_of_slopes(slope: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 def _mean_square_angle_of_sigma(sigma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """E[theta^2] under exp(-theta^2/2 sigma^2) sin(theta), and its derivative by sigma. [rad^2]"""
-    x, w = leggauss(_NODES)
+    x, w = (np.array(rule) for rule in gauss_legendre_rule(_NODES))
     top = np.minimum(math.pi / 2, _WIDTH * sigma)[:, None]
-    theta = (x + 1) / 2 * top
+    theta = x * top
     mass = w * top * np.exp(-((theta / sigma[:, None]) ** 2) / 2) * np.sin(theta)
     mass = mass / mass.sum(-1, keepdims=True)
     second, fourth = (mass * theta**2).sum(-1), (mass * theta**4).sum(-1)

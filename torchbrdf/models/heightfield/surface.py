@@ -15,7 +15,7 @@ from torchbrdf.models.heightfield.slope_frame import slope_frame
 from torchbrdf.models.heightfield.table import TableSize, bounce_table, read_table
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
 from torchbrdf.models.rungs import Member, stand_ins
-from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Interval, fixed, kept
+from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Interval, ParameterValue, fixed, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 BounceCount = int | Literal["all"]
@@ -121,7 +121,7 @@ def sum_of_orders(albedo: Tensor, fields: Tensor, first: int = 1) -> Tensor:
     return rho**first * total
 
 
-def sigma_of(name: str, rms_slope: Tensor | float | fixed) -> Tensor | fixed:
+def sigma_of(name: str, rms_slope: ParameterValue) -> Tensor | fixed:
     """Sigma of an rms slope, held fixed where the slope is; raises ValueError in the name of the slope."""
     given = torch.as_tensor(rms_slope.value if isinstance(rms_slope, fixed) else rms_slope)
     RMS_SLOPE.check(name, given)
@@ -151,9 +151,9 @@ class GaussianHeightfield(CltcSampled, BRDF):
     def __init__(
         self,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        sigma: Tensor | float | fixed = 0.3,
-        occlusion: Tensor | float | fixed = fixed(1.0),  # noqa: B008 - frozen
+        albedo: ParameterValue = 0.5,
+        sigma: ParameterValue = 0.3,
+        occlusion: ParameterValue = fixed(1.0),  # noqa: B008 - frozen
         bounces: BounceCount = "all",
         nodes: int = 240,
         polar_nodes: int = 14,
@@ -170,10 +170,10 @@ class GaussianHeightfield(CltcSampled, BRDF):
     @classmethod
     def from_rms_slope(
         cls,
-        rms_slope: Tensor | float | fixed,
+        rms_slope: ParameterValue,
         *,
-        albedo: Tensor | float | fixed = 0.5,
-        occlusion: Tensor | float | fixed = fixed(1.0),  # noqa: B008 - frozen
+        albedo: ParameterValue = 0.5,
+        occlusion: ParameterValue = fixed(1.0),  # noqa: B008 - frozen
         bounces: BounceCount = "all",
         nodes: int = 240,
         polar_nodes: int = 14,

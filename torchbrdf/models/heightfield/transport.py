@@ -25,7 +25,7 @@ from torchbrdf._numerics import safe_divide, safe_sqrt
 from torchbrdf.models.heightfield.direct import Quadrature, direct_light
 from torchbrdf.models.heightfield.slope_frame import SlopeFrame
 from torchbrdf.models.heightfield.visibility import HeightfieldConstants, ray
-from torchbrdf.quadrature import gauss_legendre
+from torchbrdf.quadrature import gauss_legendre, gauss_legendre_rule
 
 _SLOPE_PANELS = (0.0, 1.0, 2.0, 3.2, 4.6, 6.5, 9.0)  # standard deviations
 _SLOPES_A_PANEL = 6
@@ -101,9 +101,9 @@ def _smith_modes(slope: Tensor, nodes: Polar, orders: int) -> Tensor:
 @lru_cache(maxsize=1)
 def _slope_rule() -> tuple[list[float], list[float]]:
     """Slopes over their rms and their shares."""
-    x, w = np.polynomial.legendre.leggauss(_SLOPES_A_PANEL)
-    radius = np.concatenate([a + (b - a) * (1 + x) / 2 for a, b in pairwise(_SLOPE_PANELS)])
-    share = np.concatenate([(b - a) / 2 * w for a, b in pairwise(_SLOPE_PANELS)]) * radius * np.exp(-(radius**2) / 2)
+    x, w = (np.array(rule) for rule in gauss_legendre_rule(_SLOPES_A_PANEL))
+    radius = np.concatenate([a + (b - a) * x for a, b in pairwise(_SLOPE_PANELS)])
+    share = np.concatenate([(b - a) * w for a, b in pairwise(_SLOPE_PANELS)]) * radius * np.exp(-(radius**2) / 2)
     return radius.tolist(), (share / share.sum()).tolist()
 
 
@@ -114,14 +114,14 @@ def _facet_modes(slope: Tensor, nodes: Polar) -> tuple[Tensor, Tensor, Tensor]:
     radii, shares = _slope_rule()
     tan = slope[..., None] * slope.new_tensor(radii)
     q = tan[..., None, :] * nodes.sin[:, None]
-    found = []
+    sides = []
     for c in (nodes.cos[:, None], -nodes.cos[:, None]):
         sine_q = safe_sqrt(q * q - c * c)
         end = torch.atan2(sine_q, -c.expand_as(q))  # facets face the direction up to this azimuth
         sine, double = end.sin(), (2 * end).sin() / 2
-        found.append(torch.stack((c * end + q * sine, c * sine + q * (end + double) / 2), -3) / math.pi)
+        sides.append(torch.stack((c * end + q * sine, c * sine + q * (end + double) / 2), -3) / math.pi)
     weight = slope.new_tensor(shares) * torch.rsqrt(1 + tan * tan) / math.pi
-    return found[0], found[1], weight[..., None, None, :]
+    return sides[0], sides[1], weight[..., None, None, :]
 
 
 def _direct_albedo(
