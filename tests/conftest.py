@@ -2,8 +2,8 @@
 
 import pytest
 import torch
-from catalog import MODELS
-from materials import Model
+from helpers.catalog import MODELS
+from helpers.materials import Model
 
 from torchbrdf.testing import Directions, random_directions
 

@@ -18,6 +18,8 @@ LONGEST = 500
 ROOMS = ("shapes", "scene", "transport", "files", "fitting", "planning")
 SMALLEST_UNNAMED = 1e-5
 TOLERANCE_ARGUMENTS = {"rtol", "atol", "xtol", "ftol", "gtol", "tol"}
+# Folder of tests for each package whose folders it mirrors.
+MIRRORS = {"torchbrdf": "library"}
 
 
 def named(path: Path) -> str:
@@ -77,7 +79,7 @@ def test_there_is_something_to_check():
 @pytest.mark.parametrize("path", LIBRARY, ids=named)
 def test_library_imports_neither_pipeline_nor_tests(path):
     for module, _ in imports(path):
-        assert module.split(".")[0] not in {"inverse", "tests", "catalog", "conftest"}
+        assert module.split(".")[0] not in {"inverse", "tests", "helpers", "conftest"}
 
 
 @pytest.mark.parametrize("path", LIBRARY, ids=named)
@@ -123,6 +125,17 @@ def test_no_module_is_hidden_by_a_public_name(package):
 
 def test_few_files_lie_at_the_top_of_the_pipeline():
     assert len([p for p in (ROOT / "inverse").glob("*.py") if not p.name.startswith("__")]) <= 5
+
+
+@pytest.mark.parametrize("path", [p for p in LIBRARY + PIPELINE if p.relative_to(ROOT).parts[0] in MIRRORS], ids=named)
+def test_modules_have_a_test_file_of_their_name(path):
+    """Doors (`__init__`, `__main__`) have none: what they export is tested where it is defined."""
+    package, *folders, name = path.relative_to(ROOT).with_suffix("").parts
+    if name.startswith("__"):
+        return
+    test = ROOT.joinpath("tests", MIRRORS[package], *folders, f"test_{name.removeprefix('_')}.py")
+    assert test.is_file(), f"{named(test)} is missing"
+    assert "def test_" in test.read_text(), f"{named(test)} tests nothing"
 
 
 @pytest.mark.parametrize("path", LIBRARY + PIPELINE + TESTS, ids=named)

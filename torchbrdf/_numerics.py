@@ -63,11 +63,23 @@ def unit_tolerance(dtype: torch.dtype) -> float:
     return _UNIT_TOLERANCE_IN_EPS * torch.finfo(dtype).eps
 
 
+Components = tuple[Tensor, Tensor, Tensor]
+
+
+def components(vector: Tensor) -> Components:
+    """x, y and z (...) of vectors (..., 3), each in one piece of memory: strided ones take five times as long."""
+    x, y, z = vector.unbind(-1)
+    return (x.contiguous(), y.contiguous(), z.contiguous()) if vector.is_contiguous() else (x, y, z)
+
+
+def dot_of(a: Components, b: Components) -> Tensor:
+    """Dot product of vectors given by their components: `sum(-1)` does not fuse when compiled."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 def dot(a: Tensor, b: Tensor) -> Tensor:
-    """Dot product of (..., 3) vectors, written on components: `sum(-1)` does not fuse when compiled."""
-    ax, ay, az = a.unbind(-1)
-    bx, by, bz = b.unbind(-1)
-    return ax * bx + ay * by + az * bz
+    """Dot product of (..., 3) vectors."""
+    return dot_of(a.unbind(-1), b.unbind(-1))  # pyright: ignore[reportArgumentType]
 
 
 def cross(a: Tensor, b: Tensor) -> Tensor:
@@ -86,6 +98,13 @@ def safe_sqrt(x: Tensor) -> Tensor:
     """sqrt(x), and 0 with zero gradient where rounding left x at or below 0."""
     empty = x <= 0
     return x.masked_fill(empty, 1.0).sqrt().masked_fill(empty, 0.0)
+
+
+def sine(cosine: Tensor) -> Tensor:
+    """Sine of an angle in [0, pi] from its cosine: 0 with zero gradient where the cosine is 1, or a hair above."""
+    square = (1 - cosine) * (1 + cosine)
+    # the sign puts the exact 0 back; a product costs a fifth of a masked fill
+    return positive(square).sqrt() * square.detach().clamp(min=0).sign()
 
 
 def soft_sqrt(x: Tensor) -> Tensor:

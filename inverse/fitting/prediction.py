@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from inverse.scene import Scene
-from inverse.transport import radiance_of
+from inverse.transport import images_of
 from torchbrdf import BRDF, Cosines, LinearBRDF
 
 Predict = Callable[[dict[str, Tensor]], Tensor]
@@ -53,8 +53,8 @@ def predictor(scene: Scene, model: BRDF, pixels: Tensor, *, per_texel: bool) -> 
         return scene.sensor.focus(footprints.to_image(values))[pixels] * scene.sensor.exposure
 
     with torch.no_grad():
-        images = [radiance_of(footprints, lights, record, linear=linear, texels=texels) for lights in scene.lights]
-    return _of_raw(model, lambda m: torch.stack(torch.broadcast_tensors(*(image(m) for image in images))))
+        images = images_of(footprints, scene.lights, record, linear=linear, texels=texels)
+    return _of_raw(model, images)
 
 
 def sample_predictor(cosines: Cosines, model: BRDF) -> Predict:

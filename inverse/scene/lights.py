@@ -117,7 +117,7 @@ class Light(ABC):
         Raises: ValueError where arrivals depend on the point. Such a light says here which lamps it is made of.
         """
         rays = [_same_for_all(type(self).__name__, arrival) for arrival in self.arrivals(points)]
-        uniform = None if self.uniform is None else torch.atleast_1d(torch.as_tensor(self.uniform)).detach().double()
+        uniform = None if self.uniform is None else _in_full(self.uniform)
         if not rays:
             return StoredLight(uniform=uniform)
         channels = max(len(irradiance) for _, irradiance in rays)
@@ -201,8 +201,7 @@ class Point(Light):
         return (SimplerLight(NEAR_LIGHT, choice, distant),)
 
     def stored(self, points: Tensor) -> StoredLight:
-        strength = torch.atleast_1d(torch.as_tensor(self.intensity)).detach().double()
-        return StoredLight(positions=self.position.detach().double()[None], intensities=strength[None])
+        return StoredLight(positions=self.position.detach().double()[None], intensities=_in_full(self.intensity)[None])
 
 
 @dataclass(frozen=True)
@@ -402,6 +401,11 @@ def _unit(name: str, value: Tensor) -> Tensor:
 def as_channels(strength: Tensor | float, like: Tensor) -> Tensor:
     """A strength as (1 or channel,), in the dtype and on the device of another tensor."""
     return torch.atleast_1d(torch.as_tensor(strength, dtype=like.dtype, device=like.device))
+
+
+def _in_full(strength: Tensor | float) -> Tensor:
+    """A strength as (1 or channel,) in float64: a number keeps the digits that the default dtype would cost it."""
+    return torch.atleast_1d(torch.as_tensor(strength, dtype=torch.float64)).detach()
 
 
 def _row(strength: Tensor | float, points: Tensor) -> Tensor:

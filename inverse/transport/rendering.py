@@ -8,7 +8,7 @@ from torch import Tensor
 
 from inverse.scene import Arrival, Footprints, Light, Scene, as_channels
 from inverse.transport.direct import unhidden
-from inverse.transport.exchange import passed_on
+from inverse.transport.exchange import passed_on, white_sky_albedo
 from inverse.transport.radiosity import bounced, sky_share
 from torchbrdf import BRDF, Cosines, LinearBRDF, is_per_texel
 
@@ -24,43 +24,68 @@ def render(scene: Scene, model: BRDF) -> Tensor:
     Simulates what the scene has switched on; `Plan.render` what a plan keeps.
     """
     footprints = scene.footprints()
-    images = [radiance_of(footprints, lights, footprints.to_image)(model) for lights in scene.lights]
-    return torch.stack(torch.broadcast_tensors(*images))
+    return images_of(footprints, scene.lights, footprints.to_image)(model)
 
 
-def radiance_of(
+def radiance_of(footprints: Footprints, lights: Sequence[Light]) -> Callable[[BRDF], Tensor]:
+    """Function from a model to its radiance (point, channel) under lights that shine together."""
+    images = images_of(footprints, [lights], lambda values: values)
+    return lambda model: images(model)[0]
+
+
+def images_of(
     footprints: Footprints,
-    lights: Sequence[Light],
-    record: Values = lambda values: values,
+    light_sets: Sequence[Sequence[Light]],
+    record: Values,
     *,
     linear: LinearBRDF | None = None,
     texels: Tensor | None = None,
 ) -> Callable[[BRDF], Tensor]:
-    """Function from a model to what is recorded (..., channel) of its radiance under the lights of one image.
+    """Function from a model to what is recorded (image, ..., channel) of its radiance under each set of lights.
 
     What does not depend on the model is done once, recording included.
 
     Args:
-        record: linear function of values (point, channel), by default the values themselves.
+        record: linear function of values (point, channel), such as `footprints.to_image`.
         linear: for models of this kind alone: its geometry images are kept, so that each further material
             costs K multiply-adds. Used where no light has a uniform part.
         texels: which points are recorded, for linear models with parameters per texel.
     Per-texel parameters run over the points.
     """
-    parts = [_direct(footprints, lights, record, linear, texels)]
-    if footprints.partner is not None:
-        parts.append(_exchanged(footprints, lights, record))
-    return lambda model: sum((part(model) for part in parts[1:]), parts[0](model))
+    if linear is not None and not any(light.uniform is not None for lights in light_sets for light in lights):
+        direct = _contraction(footprints, light_sets, record, linear, texels)
+    else:
+        direct = _reflection(footprints, light_sets, record)
+    if footprints.partner is None:
+        return direct
+    bounces = [_recorded_bounces(footprints, lights, record) for lights in light_sets]
+    return lambda model: direct(model) + _exchanged(model, bounces)
 
 
-def _direct(
-    footprints: Footprints, lights: Sequence[Light], record: Values, linear: LinearBRDF | None, texels: Tensor | None
+def _reflection(
+    footprints: Footprints, light_sets: Sequence[Sequence[Light]], record: Values
 ) -> Callable[[BRDF], Tensor]:
-    if linear is None or any(light.uniform is not None for light in lights):
-        reflections = [reflected(footprints, light) for light in lights]
-        return lambda model: record(sum((part(model) for part in reflections[1:]), reflections[0](model)))
-    images = lit_basis(footprints, linear, lights)
-    basis = record(images.flatten(1)).unflatten(-1, images.shape[1:])
+    sets = [[reflected(footprints, light) for light in lights] for lights in light_sets]
+
+    def images(model: BRDF) -> Tensor:
+        sums = [sum((part(model) for part in parts[1:]), parts[0](model)) for parts in sets]
+        return torch.stack(torch.broadcast_tensors(*(record(values) for values in sums)))
+
+    return images
+
+
+def _contraction(
+    footprints: Footprints,
+    light_sets: Sequence[Sequence[Light]],
+    record: Values,
+    linear: LinearBRDF,
+    texels: Tensor | None,
+) -> Callable[[BRDF], Tensor]:
+    recorded = []
+    for lights in light_sets:
+        images = lit_basis(footprints, linear, lights)
+        recorded.append(record(images.flatten(1)).unflatten(-1, images.shape[1:]))
+    basis = torch.stack(torch.broadcast_tensors(*recorded))  # (image, ..., 1 or channel, K)
 
     def contracted(model: BRDF) -> Tensor:
         assert isinstance(model, LinearBRDF)
@@ -72,12 +97,16 @@ def _direct(
     return contracted
 
 
-def _exchanged(footprints: Footprints, lights: Sequence[Light], record: Values) -> Callable[[BRDF], Tensor]:
-    """What parts of the solid send on to each other."""
+def _recorded_bounces(footprints: Footprints, lights: Sequence[Light], record: Values) -> Tensor:
+    """Irradiances (bounce, ..., 1 or channel) that white parts of the solid send on to each other."""
     assert footprints.partner is not None
     bounces = bounced(footprints.partner, lights, footprints.points, footprints.normals)
-    images = torch.stack([record(bounce) for bounce in bounces])
-    return lambda model: passed_on(model, images)
+    return torch.stack([record(bounce) for bounce in bounces])
+
+
+def _exchanged(model: BRDF, bounces: Sequence[Tensor]) -> Tensor:
+    rho = white_sky_albedo(model, bounces[0])
+    return torch.stack(torch.broadcast_tensors(*(passed_on(rho, images) for images in bounces)))
 
 
 def cosines_to(arrival: Arrival, footprints: Footprints) -> Cosines:

@@ -5,16 +5,24 @@ import math
 
 import pytest
 import torch
+from helpers.he_torrance_surfaces import GOLDEN, close
+from helpers.probes import doubles
 from scipy.integrate import quad
 from torch.testing import assert_close
 
-from torchbrdf import Conductor, Dielectric, Schlick, conductor, dielectric, dielectric_average, f0_from_index, schlick
+from torchbrdf import (
+    Conductor,
+    Dielectric,
+    Schlick,
+    conductor,
+    conductor_amplitudes,
+    dielectric,
+    dielectric_average,
+    f0_from_index,
+    schlick,
+)
 
 COSINES = [1e-6, 0.01, 0.2, 0.5, 0.745, 0.9, 1.0]
-
-
-def doubles(x):
-    return torch.tensor(x, dtype=torch.float64)
 
 
 def textbook(c, index):
@@ -106,3 +114,11 @@ def test_gradients():
     (slope, of_k) = torch.autograd.grad(conductor(edge, eta=doubles(1.5), k=nothing).sum(), (edge, nothing))
     assert slope.isfinite().all()
     assert math.isfinite(of_k)
+
+
+@pytest.mark.parametrize("case", GOLDEN["fresnel"])
+def test_fresnel(case):
+    cos, eta, k = (doubles([x]) for x in (case["cos"], *case["n"]))
+    close(conductor(cos, eta=eta, k=k), case["F2"], 1e-12)
+    for got, expected in zip(conductor_amplitudes(cos, eta=eta, k=k), (case["rs"], case["rp"]), strict=True):
+        assert abs(complex(got) - complex(*map(float, expected))) < 1e-15

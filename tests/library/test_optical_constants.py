@@ -5,20 +5,10 @@ from pathlib import Path
 
 import pytest
 import torch
-from test_he_torrance import doubles
+from helpers.probes import doubles
 from torch.testing import assert_close
 
-from torchbrdf import (
-    ACRYLIC,
-    ALUMINIUM,
-    COPPER,
-    CROWN_GLASS,
-    FUSED_SILICA,
-    GOLD,
-    MAGNESIUM_OXIDE,
-    SILVER,
-    conductor,
-)
+from torchbrdf import ACRYLIC, ALUMINIUM, COPPER, CROWN_GLASS, FUSED_SILICA, GOLD, MAGNESIUM_OXIDE, SILVER, conductor
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "optical_constants"
 METALS = [ALUMINIUM, COPPER, GOLD, SILVER]

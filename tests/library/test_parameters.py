@@ -1,4 +1,4 @@
-"""Material parameters: domains, storage, converters; and sums of models."""
+"""Material parameters: domains, storage, converters."""
 
 import math
 
@@ -12,14 +12,12 @@ from torchbrdf import (
     Lambert,
     OrenNayar,
     QualitativeOrenNayar,
-    WeightedSum,
     fixed,
     sigma_from_beckmann_alpha,
     sigma_from_degrees,
     sigma_from_mean_slope,
     trainable,
 )
-from torchbrdf.testing import TOLERANCE, random_directions
 
 UNIT, HALF_LINE = Interval(0.0, 1.0), Interval(0.5, math.inf)
 DOMAINS = {"albedo": (0.0, 1.0), "sigma": (0.0, math.pi / 2)}
@@ -189,59 +187,6 @@ def test_converters_keep_dtype(convert, dtype):
     assert convert(0.3).dtype == convert(1).dtype == torch.float32
 
 
-class TestWeightedSum:
-    @pytest.fixture
-    def directions(self):
-        return random_directions(50, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
-
-    @pytest.fixture
-    def parts(self):
-        return OrenNayar(albedo=0.7, sigma=0.5).double(), Lambert(albedo=0.4).double()
-
-    def test_is_the_sum_of_its_parts(self, parts, directions):
-        a, b = parts
-        tight = {"rtol": TOLERANCE[torch.float64].rounding, "atol": 0.0}
-        expected = 0.7 * a(*directions) + 0.3 * b(*directions)
-        assert_close((0.7 * a + 0.3 * b)(*directions), expected, **tight)
-        assert_close((a * 0.7 + b * 0.3)(*directions), expected, **tight)
-        assert_close((a + b)(*directions), a(*directions) + b(*directions), **tight)
-        assert_close((2 * (0.7 * a + 0.3 * b) + a)(*directions), 2 * expected + a(*directions), **tight)
-        assert_close(WeightedSum(parts, [0.7, 0.3])(*directions), expected, **tight)
-
-    def test_weights_are_trainable(self, parts, directions):
-        brdf = 0.7 * parts[0] + 0.3 * parts[1]
-        raw = dict(brdf.named_parameters())["raw_weights"]
-        (slope,) = torch.autograd.grad(brdf(*directions).sum(), raw)
-        assert_close(slope, torch.stack([w * p(*directions).sum() for w, p in zip((0.7, 0.3), parts, strict=True)]))
-
-    def test_components_are_named_by_model(self, parts, directions):
-        brdf = 0.7 * parts[0] + 0.3 * parts[1] + 0.1 * parts[1]
-        got = brdf.components(*directions)
-        assert list(got) == ["OrenNayar.direct", "OrenNayar.interreflection", "Lambert.direct", "Lambert.direct#2"]
-        assert_close(got["Lambert.direct#2"], 0.1 * parts[1](*directions))
-
-    @pytest.mark.parametrize("weight", [0.0, -0.5, math.nan, math.inf])
-    def test_weight_that_is_not_positive_is_refused(self, parts, weight):
-        with pytest.raises(ValueError, match=r"WeightedSum.weights must lie in \(0, inf\)"):
-            weight * parts[0]
-        with pytest.raises(ValueError, match=r"WeightedSum.weights must lie in \(0, inf\); 1 of 2"):
-            WeightedSum(parts, [weight, 1.0])
-
-    def test_weights_follow_the_dtype_of_the_parts(self, parts):
-        assert (0.7 * parts[0]).weights.dtype == torch.float64
-        assert (0.7 * Lambert()).weights.dtype == torch.float32
-
-
 def test_half_precision_parameters_are_refused():
     with pytest.raises(TypeError, match=r"OrenNayar.albedo must be float32 or float64; found torch.float16"):
         OrenNayar(albedo=torch.tensor(0.5, dtype=torch.float16))
-
-
-def test_sums_refuse_what_does_not_add_up():
-    with pytest.raises(ValueError, match="found 1 parts and 2 weights"):
-        WeightedSum([Lambert()], [1.0, 2.0])
-    with pytest.raises(ValueError, match="at least one part"):
-        WeightedSum([], [])
-    with pytest.raises(TypeError, match="adds BRDFs; found int"):
-        Lambert() + 3  # pyright: ignore
-    assert len(sum([Lambert(), Lambert()]).parts) == 2  # pyright: ignore

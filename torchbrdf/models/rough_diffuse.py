@@ -6,10 +6,11 @@ from typing import Any, final
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import angle_over_sine, safe_sqrt
+from torchbrdf._numerics import angle_over_sine, safe_sqrt, sine
 from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.effects import INTERREFLECTION, ROUGHNESS
+from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.models.rungs import Member, lambert, stand_ins
 from torchbrdf.parameters import ALBEDO, Constrained, Interval, ParameterValue, kept
@@ -26,7 +27,7 @@ FON_ROUGHNESS = Interval(0.0, 1.0)
 def retro_term(cosines: Cosines) -> Tensor:
     """s/t (...), with s = sin_i sin_r cos(dphi) and t the larger cosine on the side of the light, 1 on the other."""
     s = cosines.in_plane
-    return torch.where(s > 0, s / cosines.beta, s)
+    return s.relu() / cosines.beta + s.clamp(max=0)
 
 
 def retro_share(cos: Tensor, *, exact: bool = True) -> Tensor:
@@ -40,10 +41,12 @@ def retro_share(cos: Tensor, *, exact: bool = True) -> Tensor:
         x = 1 - cos
         first, second, third, fourth = _FITTED_G
         return x * (first + x * (second + x * (third + x * fourth)))
-    sine = safe_sqrt((1 - cos) * (1 + cos))
-    theta = sine * angle_over_sine(cos)
-    g = sine * (theta - sine * cos) + 2 / 3 * sine * (cos * (1 + sine + sine * sine) / (1 + sine) - 1)
-    return g / math.pi
+    return _retro_share(cos, sine(cos), angle_over_sine(cos))
+
+
+def _retro_share(cos: Tensor, s: Tensor, angle_over_s: Tensor) -> Tensor:
+    within = s * (angle_over_s - cos)
+    return s / math.pi * (within + (2 / 3) * (cos * (s + 1 / (1 + s)) - 1))
 
 
 def fon_albedo(cos: Tensor, *, roughness: Tensor, exact: bool = True) -> Tensor:
@@ -73,12 +76,20 @@ def eon_albedo_from_directional(target: Tensor, cos: Tensor, *, roughness: Tenso
     return 2 * target / (b + safe_sqrt(b * b + 4 * target * (average - directional)))
 
 
-class _RoughDiffuse(CltcSampled, LinearBRDF):
+class _RoughDiffuse(CltcSampled, FieldBRDF, LinearBRDF):
     albedo: Constrained = Constrained(ALBEDO)
     roughness: Constrained = Constrained(FON_ROUGHNESS)
 
     def sampling_roughness(self) -> Tensor:
         return self.roughness
+
+    def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        """White FON (...). [1/sr]"""
+        r = self.roughness
+        return ((1 + r * retro_term(cosines)) / (math.pi * (1 + C1 * r)),)
+
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
+        return {"direct": torch.atleast_1d(self.albedo) * fields[0]}
 
     def _direct(self) -> tuple[Tensor, Tensor, Tensor]:
         """Coefficients of 1 and of the retro term, and r, all with a trailing channel."""
@@ -159,9 +170,30 @@ class EON(_RoughDiffuse):
         self.roughness = roughness
         self.exact = exact
 
+    def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        """White FON, and what comes of the light it loses (...). [1/sr]"""
+        r = self.roughness
+        return (*super().fields(cosines), r / (math.pi * (1 + C1 * r)) * self._lost(cosines))
+
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
+        return super().parts_of(fields[0]) | {"interreflection": self._returned() * fields[1]}
+
+    def sum_of(self, *fields: Tensor) -> Tensor:
+        rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness[..., None])
+        direct, returned = fields
+        return rho * (direct + rho * (average * returned) / (1 - rho * (1 - average)))
+
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
-        lost = [C1 - retro_share(c, exact=self.exact) for c in (cosines.light, cosines.view)]
-        return torch.ones_like(cosines.light), retro_term(cosines), lost[0] * lost[1] / (C1 - C2)
+        return torch.ones_like(cosines.light), retro_term(cosines), self._lost(cosines)
+
+    def _lost(self, cosines: Cosines) -> Tensor:
+        if not self.exact:
+            shares = [retro_share(c, exact=False) for c in (cosines.light, cosines.view)]
+        else:
+            c = cosines
+            polar = ((c.alpha, c.sin_alpha, c.alpha_over_sine), (c.beta, c.sin_beta, c.beta_over_sine))
+            shares = [_retro_share(*angle) for angle in polar]
+        return (C1 - shares[0]) * (C1 - shares[1]) / (C1 - C2)
 
     def component_coefficients(self) -> dict[str, Tensor]:
         flat, retro, r = self._direct()

@@ -39,9 +39,8 @@ def visible_beckmann_facet(view: Tensor, alpha_x: Tensor, alpha_y: Tensor, u: Te
     """
     stretched = _stretched(view, alpha_x, alpha_y)
     # facet normals proportional to (-p, -q, 1) with slopes p along the view's azimuth
-    cos = stretched[..., 2]
+    cos, u1 = torch.broadcast_tensors(stretched[..., 2], u[..., 0])
     sin = safe_sqrt((1 - cos) * (1 + cos))
-    u1 = u[..., 0].expand_as(cos)
     # integral of (cos + t sin) exp(-t^2) up to t, for t = -p from -cot(theta) on
     low = torch.maximum(-cos / sin.clamp(min=torch.finfo(cos.dtype).tiny), torch.full_like(cos, -_ERF_END))
     high = torch.full_like(cos, _ERF_END)

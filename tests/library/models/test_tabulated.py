@@ -4,30 +4,10 @@ import math
 
 import pytest
 import torch
+from helpers.probes import doubles, few, held
 from torch.testing import assert_close
 
-from torchbrdf import (
-    GGX,
-    Cosines,
-    Lambert,
-    TabulatedBRDF,
-    fixed,
-    rusinkiewicz_angles,
-)
-from torchbrdf import testing as laws
-
-
-def doubles(x):
-    return torch.tensor(x, dtype=torch.float64)
-
-
-def held(x):
-    return fixed(doubles(x))
-
-
-def few(n=200, max_angle=85.0):
-    generator = torch.Generator().manual_seed(5)
-    return laws.random_directions(n, dtype=torch.float64, generator=generator, max_angle=math.radians(max_angle))
+from torchbrdf import GGX, Cosines, Lambert, TabulatedBRDF, rusinkiewicz_angles
 
 
 def test_rusinkiewicz_angles_are_those_of_rotated_vectors():

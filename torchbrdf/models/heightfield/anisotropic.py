@@ -106,7 +106,7 @@ class AnisotropicGaussianHeightfield(CltcSampled, BRDF):
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-]
         sigma_x, sigma_y: roughness along and across the tangent, scalar or (...). [rad] `from_rms_slopes` takes the
             rms slopes instead.
-        occlusion: E, scalar or (...). [-] in [0, 1.2]; held at 1 unless given.
+        occlusion: E, scalar or (...). [-] in [0, 1.8]; held at 1 unless given.
         nodes, constants: as in `gaussian_heightfield`.
     Components: direct.
     Raises: ValueError outside the domains, for other nodes, and without a tangent.

@@ -104,8 +104,8 @@ def _direct_light(
     # An empty interval weighs nothing, and must not overflow.
     seen = (1 + wide.other_across * y + wide.other_along * x).relu()
     steep = x * (wide.along * x + 2 * wide.mixed * y) + (1 + wide.across * y * y)
-    masking_first = facet_masking((first.steepness + x).relu(), first, occlusion[..., None, None])
-    masking_second = facet_masking(second.steepness * seen, second, occlusion[..., None, None])
+    masking_first = facet_masking((first.steepness + x).relu(), first)
+    masking_second = facet_masking(second.steepness * seen, second)
     joint = joint_masking(masking_first, masking_second, independent)
     facets = lit * seen * torch.rsqrt(steep) / (1 + joint)
     return ((facets * weight_x).sum(-1) * weight_y).sum(-1) / math.pi

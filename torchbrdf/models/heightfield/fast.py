@@ -161,8 +161,12 @@ class FastGaussianHeightfield(CltcSampled, BRDF):
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
 
+    def fields(self, cosines: Cosines) -> HeightfieldFields:
+        """What unit albedo returns, each (...) [1/sr]; finite below the horizon."""
+        return heightfield_fields(cosines, self.sigma)
+
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
-        return reflectance(self.albedo, heightfield_fields(cosines, self.sigma))
+        return reflectance(self.albedo, self.fields(cosines))
 
     def members(self) -> list[Member]:
         """The ladder up to this model."""

@@ -18,8 +18,8 @@ from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, Interval, fixed
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 BounceCount = int | Literal["all"]
-# Beyond 1 the masking dips below 0: more facets would be seen than there are. It is -1e-5 at 1.2, -5e-3 at 1.6.
-OCCLUSION = Interval(0.0, 1.2)
+# At 2 a facet seen edge-on would never be seen.
+OCCLUSION = Interval(0.0, 1.8)
 
 
 class Settings(NamedTuple):
@@ -75,8 +75,8 @@ def gaussian_heightfield(
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
         sigma: roughness, scalar or (...). [rad] in [0, pi/2]; 0 is Lambert exactly. `rms_slope_from_sigma` says
             what rms slope s it stands for.
-        occlusion: E, how much the surface near by hides, scalar or (...). [-] in [0, 1.2]; 0 is Smith's surface with
-            correlated heights, 1 a surface of one smooth scale.
+        occlusion: E, how much the surface near by hides, scalar or (...). [-] in [0, 1.8]; 0 is Smith's surface with
+            correlated heights, 1 a surface of one smooth scale, about 1.6 one of two scales.
         bounces: 1, 2, .. or "all", which is table_orders + 1.
         nodes: slopes of the direct light: 160, 240, 384 or 560.
         polar_nodes, table_orders: size of the table of bounces.
@@ -85,9 +85,9 @@ def gaussian_heightfield(
     Raises: ValueError outside the domains, or for other nodes or bounces.
     Deviations: the slope integral errs by up to 7e-4, 8e-5, 4e-5, 9e-6 at 160, 240, 384, 560 nodes, the table by up to
         1e-3 of f. White facets return 1 within 1e-3 up to 89 deg. Path-traced meshes up to 80 deg, rho = 0.9: within
-        0.3, 0.8, 1.1 % rms at s = 0.3, 0.67, 1, most of it in the bounces, which are blind to occlusion. Beyond
-        occlusion 1 up to 1e-5 more facets are seen than there are. The cone at light = view has subgradient 0. A field
-        of sigma costs a table for each entry unless bounces = 1.
+        0.3, 0.8, 1.1 % rms at s = 0.3, 0.67, 1, most of it in the bounces, which are blind to occlusion; two
+        scales at occlusion 1.6: f_1 within 0.8 %. The cone at light = view has subgradient 0. A field of sigma costs a
+        table for each entry unless bounces = 1.
     Source: own; see `docs/heightfield.md` for what it is built on.
     """
     ALBEDO.check("gaussian_heightfield: albedo", albedo)
@@ -135,7 +135,7 @@ class GaussianHeightfield(CltcSampled, BRDF):
     Args:
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-]
         sigma: roughness, scalar or (...). [rad] `from_rms_slope` takes the rms slope instead.
-        occlusion: E, scalar or (...). [-] in [0, 1.2]; held at 1 unless given.
+        occlusion: E, scalar or (...). [-] in [0, 1.8]; held at 1 unless given.
         bounces, nodes, polar_nodes, table_orders, constants: as in `gaussian_heightfield`.
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError outside the domains, or for other nodes or bounces.

@@ -10,6 +10,7 @@ from torchbrdf import effects
 from torchbrdf._numerics import positive_part
 from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
+from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
 from torchbrdf.models.rungs import Member, stand_ins
@@ -45,9 +46,18 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
     """
     ALBEDO.check("oren_nayar: albedo", albedo)
     ROUGHNESS.check("oren_nayar: sigma", sigma)
-    coefficients = direct_coefficients(albedo, sigma) + interreflection_coefficients(albedo, sigma)
-    terms = torch.stack(torch.broadcast_tensors(*geometry_terms(cosines)), -1)
-    return cosines.zero_below_horizon((coefficients * terms[..., None, :]).sum(-1))
+    direct, bounced = ((field * cosines.lit)[..., None] for field in fields(cosines, sigma))
+    albedo = torch.atleast_1d(albedo)
+    return albedo * (direct + albedo * bounced)
+
+
+def fields(cosines: Cosines, sigma: Tensor, *, c3: bool = True) -> tuple[Tensor, Tensor]:
+    """Light reflected once and twice by white facets, Oren & Nayar 1994, eqs. (27) and (28), each (...). [1/sr]"""
+    _, along, across, bounce = geometry_terms(cosines, c3=c3)
+    s2 = sigma * sigma
+    slope = s2 / (math.pi * (s2 + 0.09))
+    direct = 1 / math.pi - (0.5 / math.pi) * s2 / (s2 + 0.33) + slope * (0.45 * along + 0.125 * across)
+    return direct, (0.17 / math.pi) * s2 / (s2 + 0.13) * (1 - bounce)
 
 
 def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -93,7 +103,7 @@ def interreflection_coefficients(albedo: Tensor, sigma: Tensor) -> Tensor:
 
 
 @final
-class OrenNayar(CltcSampled, LinearBRDF):
+class OrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
     """Functional approximation as a module; see `oren_nayar` for equation, units and deviations.
 
     Args:
@@ -128,6 +138,22 @@ class OrenNayar(CltcSampled, LinearBRDF):
 
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
+
+    def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        parts = zip(self._parts.values(), fields(cosines, self.sigma, c3=self.c3), strict=True)
+        return tuple(field for included, field in parts if included)
+
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
+        albedo = torch.atleast_1d(self.albedo)
+        parts = {"direct": lambda field: albedo * field, "interreflection": lambda field: albedo * (albedo * field)}
+        included = (name for name, wanted in self._parts.items() if wanted)
+        return {name: parts[name](field) for name, field in zip(included, fields, strict=True)}
+
+    def sum_of(self, *fields: Tensor) -> Tensor:
+        if len(fields) < 2:
+            return super().sum_of(*fields)
+        albedo, (direct, bounced) = torch.atleast_1d(self.albedo), fields
+        return albedo * (direct + albedo * bounced)
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return geometry_terms(cosines, c3=self.c3)

@@ -10,6 +10,7 @@ from torchbrdf import effects
 from torchbrdf._numerics import positive_part
 from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
+from torchbrdf.fields import FieldBRDF
 from torchbrdf.linear import LinearBRDF
 from torchbrdf.models.rungs import Member, lambert, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue
@@ -38,11 +39,15 @@ def qualitative(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, a_constant: 
     """
     ALBEDO.check("qualitative: albedo", albedo)
     ROUGHNESS.check("qualitative: sigma", sigma)
-    coefficients = qualitative_coefficients(albedo, sigma, a_constant)
-    flat, backward = geometry_terms(cosines)
-    return cosines.zero_below_horizon(
-        coefficients[..., 0] * flat[..., None] + coefficients[..., 1] * backward[..., None]
-    )
+    return torch.atleast_1d(albedo) * (field(cosines, sigma, a_constant) * cosines.lit)[..., None]
+
+
+def field(cosines: Cosines, sigma: Tensor, a_constant: float) -> Tensor:
+    """Reflectance of white facets (...). [1/sr]"""
+    s2 = sigma * sigma
+    _, backward = geometry_terms(cosines)
+    flat = 1 / math.pi - (0.5 / math.pi) * s2 / (s2 + a_constant)
+    return flat + (0.45 / math.pi) * s2 / (s2 + 0.09) * backward
 
 
 def geometry_terms(cosines: Cosines) -> tuple[Tensor, Tensor]:
@@ -60,7 +65,7 @@ def qualitative_coefficients(albedo: Tensor, sigma: Tensor, a_constant: float) -
 
 
 @final
-class QualitativeOrenNayar(CltcSampled, LinearBRDF):
+class QualitativeOrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
     """Qualitative model as a module; see `qualitative` for equation, units and deviations.
 
     Args:
@@ -90,6 +95,12 @@ class QualitativeOrenNayar(CltcSampled, LinearBRDF):
 
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
+
+    def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        return (field(cosines, self.sigma, self.a_constant),)
+
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
+        return {"direct": torch.atleast_1d(self.albedo) * fields[0]}
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return geometry_terms(cosines)
