@@ -79,5 +79,5 @@ def _smith(t2: Tensor) -> tuple[Tensor, Tensor]:
     steep = 1 / t2.clamp(min=_FLAT)
     root = steep.sqrt()
     masking = torch.exp(-0.5 * steep) / (math.sqrt(2 * math.pi) * root) - 0.5 * torch.erfc(math.sqrt(0.5) * root)
-    # Exactly 0 next to the normal: what the azimuth's derivative, which grows there, is multiplied by.
-    return threshold(masking, _NOTHING_HIDDEN, 0.0), steep
+    # Next to the normal a constant that changes no digit; not 0, where the joint masking has no second derivative.
+    return threshold(masking, _NOTHING_HIDDEN, _NOTHING_HIDDEN), steep
