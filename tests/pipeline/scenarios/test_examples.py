@@ -96,7 +96,7 @@ def test_ladder_is_measured_and_drawn(run, tmp_path):
 def test_every_model_is_timed(run):
     printed = dict(line.split()[:2] for line in run("benchmarks/cost_of_models.py", "--points", 200).splitlines())
     models = {name for name, kind in vars(torchbrdf).items() if isinstance(kind, type) and issubclass(kind, BRDF)}
-    assert set(printed) == models - {"BRDF", "LinearBRDF", "ImageBRDF", "WeightedSum", "Oriented"}
+    assert set(printed) == models - {"BRDF", "FieldBRDF", "LinearBRDF", "ImageBRDF", "WeightedSum", "Oriented"}
     assert next(iter(printed.items())) == ("Lambert", "1")
     assert float(printed["RoughSurface"]) > float(printed["OrenNayar"])
 
