@@ -42,7 +42,7 @@ def bounce_table(
     numbers = _plain(sigma), _plain(occlusion)
     if numbers[0] is None or numbers[1] is None:
         return _table(sigma.double(), occlusion.double(), constants, quadrature, size)
-    return _kept_table(numbers[0], numbers[1], constants, quadrature, size).to(sigma.device)
+    return kept_table(numbers[0], numbers[1], constants, quadrature, size).to(sigma.device)
 
 
 def _plain(value: Tensor) -> float | None:
@@ -56,9 +56,10 @@ def _plain(value: Tensor) -> float | None:
 
 
 @lru_cache(maxsize=32)
-def _kept_table(
+def kept_table(
     sigma: float, occlusion: float, constants: HeightfieldConstants, quadrature: Quadrature, size: TableSize
 ) -> Tensor:
+    """The table of a material given by numbers, which is kept."""
     with torch.no_grad():
         first, second = (torch.tensor(value, dtype=torch.float64) for value in (sigma, occlusion))
         return _table(first, second, constants, quadrature, size)

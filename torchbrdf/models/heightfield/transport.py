@@ -69,14 +69,14 @@ def bounce_modes(
         polar: nodes of the polar angle in light and view.
     """
     nodes = polar_nodes(polar, slope)
-    modes = _smith_modes(slope, nodes, orders)
-    lost = 1 - _direct_albedo(slope, occlusion, constants, quadrature, nodes)
+    modes = smith_modes(slope, nodes, orders)
+    lost = 1 - direct_albedo(slope, occlusion, constants, quadrature, nodes)
     share = modes[..., 0, :, :].sum(-3) * (nodes.solid_angle * nodes.cos)
     balance = _balance(share, lost)
     return modes * (balance[..., :, None] * balance[..., None, :])[..., None, None, :, :]
 
 
-def _smith_modes(slope: Tensor, nodes: Polar, orders: int) -> Tensor:
+def smith_modes(slope: Tensor, nodes: Polar, orders: int) -> Tensor:
     """F_n of Smith's surface, (..., orders, 2, P, P); mode 1 of even orders damped."""
     masking = ray(slope[..., None] * nodes.sin / nodes.cos, torch.zeros_like(slope)[..., None], _SMITH).masking
     extinction = (1 + masking[..., :, None] + masking[..., None, :])[..., None, :, :]
@@ -124,7 +124,7 @@ def _facet_modes(slope: Tensor, nodes: Polar) -> tuple[Tensor, Tensor, Tensor]:
     return sides[0], sides[1], weight[..., None, None, :]
 
 
-def _direct_albedo(
+def direct_albedo(
     slope: Tensor, occlusion: Tensor, constants: HeightfieldConstants, quadrature: Quadrature, nodes: Polar
 ) -> Tensor:
     """Share of light that leaves after one bounce (..., P), of unit albedo."""

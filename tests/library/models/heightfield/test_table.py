@@ -5,7 +5,7 @@ from helpers.heightfields import F64, f64, golden, golden_fields
 from torch.testing import assert_close
 
 from torchbrdf import Cosines, GaussianHeightfield, gaussian_heightfield
-from torchbrdf.models.heightfield.table import _kept_table
+from torchbrdf.models.heightfield.table import kept_table
 from torchbrdf.testing import random_directions
 
 
@@ -19,20 +19,20 @@ def test_default_table_resolves_the_bounces():
 def test_tables_are_kept_while_the_parameters_stay():
     directions = random_directions(5, dtype=F64, generator=torch.Generator().manual_seed(8))
     brdf = GaussianHeightfield(albedo=0.5, sigma=0.4321, nodes=160).double()
-    _kept_table.cache_clear()
+    kept_table.cache_clear()
     with torch.no_grad():
         first = brdf(*directions)
         brdf(*directions)
-        assert _kept_table.cache_info()[:2] == (1, 1)  # hits, misses
+        assert kept_table.cache_info()[:2] == (1, 1)  # hits, misses
         brdf.albedo = f64(0.9)
         brdf(*directions)
-        assert _kept_table.cache_info()[:2] == (2, 1)
+        assert kept_table.cache_info()[:2] == (2, 1)
         brdf.sigma = f64(0.5)
         assert (brdf(*directions) != first).all()
-    assert _kept_table.cache_info()[:2] == (2, 2)
+    assert kept_table.cache_info()[:2] == (2, 2)
     brdf(*directions).sum().backward()  # a table with derivatives is made anew
     brdf(*directions).sum().backward()
-    assert _kept_table.cache_info()[:2] == (2, 2)
+    assert kept_table.cache_info()[:2] == (2, 2)
 
 
 def test_no_derivative_is_lost_to_a_kept_table():

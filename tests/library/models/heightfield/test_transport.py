@@ -8,15 +8,15 @@ from torch.testing import assert_close
 
 from torchbrdf import SMOOTH_HEIGHTFIELD, rms_slope_from_sigma
 from torchbrdf.models.heightfield.direct import QUADRATURES, Quadrature
-from torchbrdf.models.heightfield.transport import _direct_albedo, _smith_modes, bounce_modes, polar_nodes
+from torchbrdf.models.heightfield.transport import bounce_modes, direct_albedo, polar_nodes, smith_modes
 
 
 @pytest.mark.parametrize("slope", [0.1, 0.67, 1.2])
 def test_unbalanced_bounces_keep_all_light(slope):
     # Smith's surface of white facets, f_1 by the slope integral and the others by invariance
     nodes = polar_nodes(20, f64(slope))
-    modes = _smith_modes(f64(slope), nodes, 150)[:, 0].sum(0)
-    once = _direct_albedo(f64(slope), f64(0.0), UNCORRELATED, Quadrature(20, 14, 5.5), nodes)
+    modes = smith_modes(f64(slope), nodes, 150)[:, 0].sum(0)
+    once = direct_albedo(f64(slope), f64(0.0), UNCORRELATED, Quadrature(20, 14, 5.5), nodes)
     total = once + (modes * (nodes.solid_angle * nodes.cos)).sum(-1)
     assert (total - 1).abs().max() < 1e-4
 
@@ -28,7 +28,7 @@ def test_balanced_bounces_return_all_light(sigma, orders, bar):
     for occlusion in (0.0, 1.0, 1.6):
         settings = (slope, f64(occlusion), SMOOTH_HEIGHTFIELD, QUADRATURES[240])
         modes = bounce_modes(*settings, polar=14, orders=orders)[:, 0].sum(0)
-        total = _direct_albedo(*settings, nodes) + (modes * (nodes.solid_angle * nodes.cos)).sum(-1)
+        total = direct_albedo(*settings, nodes) + (modes * (nodes.solid_angle * nodes.cos)).sum(-1)
         assert (total - 1).abs().max() < bar
 
 
