@@ -70,12 +70,15 @@ def judge(unknowns: Unknowns, solution: Solution, covariance: Covariance, noise:
     if solution.status != "converged":
         return solution.status, solution.reason + _texels(unknowns, solution, covariance)
     labels = unknowns.shared_labels()
-    for direction in covariance.blind:
-        involved = [labels[k] for k in (direction.abs() > _INVOLVED).nonzero()[:, 0].tolist()]
+    if len(covariance.blind):
+        # of several blind directions any mixture is one: who takes part is a matter of all of them together
+        part = covariance.blind.square().sum(0)
         others = [f"the {entry.name} of each texel" for entry in unknowns.own_entries]
-        alone = len(involved) == 1 and not others
-        names = " from ".join([*involved, *others])
-        return "not identified", f"{names} changes nothing in the data" if alone else f"the data cannot tell {names}"
+        mute = [label for label, k in zip(labels, part.tolist(), strict=True) if k > 1 - _ABSENT]
+        if mute and not others:
+            return "not identified", f"{' and '.join(mute)} changes nothing in the data"
+        involved = [label for label, k in zip(labels, part.tolist(), strict=True) if k > _INVOLVED**2]
+        return "not identified", f"the data cannot tell {' from '.join([*involved, *others])}"
     errors = covariance.shared.diagonal().sqrt() * noise
     position = 0
     verdicts = []
