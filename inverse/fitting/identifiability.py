@@ -76,7 +76,8 @@ def judge(unknowns: Unknowns, solution: Solution, covariance: Covariance, noise:
         others = [f"the {entry.name} of each texel" for entry in unknowns.own_entries]
         mute = [label for label, k in zip(labels, part.tolist(), strict=True) if k > 1 - _ABSENT]
         if mute and not others:
-            return "not identified", f"{' and '.join(mute)} changes nothing in the data"
+            each = "each of " if len(mute) > 1 else ""
+            return "not identified", f"{each}{', '.join(mute)} changes nothing in the data"
         involved = [label for label, k in zip(labels, part.tolist(), strict=True) if k > _INVOLVED**2]
         return "not identified", f"the data cannot tell {' from '.join([*involved, *others])}"
     errors = covariance.shared.diagonal().sqrt() * noise
