@@ -18,6 +18,7 @@ from torchbrdf.directions import (
     Cosines,
     any_tangent,
 )
+from torchbrdf.checks import unchecked
 from torchbrdf.effects import (
     EFFECTS,
     simulated,
@@ -294,6 +295,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "tabulated_weights",
     "torrance_sparrow",
     "trainable",
+    "unchecked",
     "v_cavities",
     "v_cavity_masking",
 ]

@@ -1,7 +1,7 @@
 """Directions at a surface point, reduced to the three cosines every isotropic model reads."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import torch
@@ -18,11 +18,13 @@ from torchbrdf._numerics import (
     holds,
     horizon,
     length,
+    number,
     positive,
     safe_sqrt,
     sine,
     unit_tolerance,
 )
+from torchbrdf.checks import taken_on_trust
 
 
 class TangentPlane(NamedTuple):
@@ -35,7 +37,10 @@ class TangentPlane(NamedTuple):
 
 
 class _computed_once:  # noqa: N801 - used as a decorator
-    """`functools.cached_property` without the lock that torch.compile cannot enter."""
+    """`functools.cached_property` without the lock that torch.compile cannot enter.
+
+    A value without the derivatives that a later reader may ask for is not kept.
+    """
 
     def __init__(self, compute: "Callable[[Cosines], Any]"):
         self.compute = compute
@@ -43,7 +48,8 @@ class _computed_once:  # noqa: N801 - used as a decorator
 
     def __get__(self, instance: "Cosines", owner: type) -> Any:
         value = self.compute(instance)
-        instance.__dict__[self.name] = value  # found before this descriptor from now on
+        if torch.is_grad_enabled() or not (instance.light.requires_grad or torch.is_inference_mode_enabled()):
+            instance.__dict__[self.name] = value  # found before this descriptor from now on
         return value
 
 
@@ -90,15 +96,18 @@ class Cosines:
             ValueError: a trailing dimension other than 3, shapes that do not broadcast, entries that
                 are not finite, or vectors that are not of unit length.
         """
-        vectors = {"normal": normal, "light": light, "view": view}
-        _check_shapes(vectors if tangent is None else vectors | {"tangent": tangent})
+        if not taken_on_trust():
+            given = {"normal": normal, "light": light, "view": view}
+            _check_shapes(given if tangent is None else given | {"tangent": tangent})
         if normalize:
-            vectors = {name: _normalized(name, v) for name, v in vectors.items()}
-        parts = [components(v) for v in vectors.values()]
-        if not normalize:
-            _check_unit(vectors, parts)
-        n, s, v = vectors.values()
-        return replace(cls._from_components(*parts), vectors=(n, s, v), tangent=tangent)
+            normal, light, view = _normalized("normal", normal), _normalized("light", light), _normalized("view", view)
+        n, s, v = components(normal), components(light), components(view)
+        if not (normalize or taken_on_trust()):
+            _check_unit({"normal": n, "light": s, "view": v})
+        result = cls._from_components(n, s, v)
+        # of a frozen instance that nobody has seen yet; `replace` would make another
+        result.__dict__.update(vectors=(normal, light, view), tangent=tangent, parts=(n, s, v))
+        return result
 
     @classmethod
     def _from_components(cls, n: Components, s: Components, v: Components) -> "Cosines":
@@ -107,22 +116,32 @@ class Cosines:
     @classmethod
     def from_products(cls, light: Tensor, view: Tensor, phase: Tensor) -> "Cosines":
         """From the three dot products themselves (...), unchecked."""
-        light, view, phase = torch.broadcast_tensors(light, view, phase)
-        above = torch.minimum(light, view) > horizon(light.dtype)
+        if not light.shape == view.shape == phase.shape:
+            light, view, phase = torch.broadcast_tensors(light, view, phase)
+        above = torch.minimum(light, view) > number(horizon(light.dtype), light)
         # multiplied and added, which takes a fifth of the time of a masked fill
         lit = above.to(light.dtype)
-        below = 1 - lit
-        light, view, phase = (torch.addcmul(below, product, lit) for product in (light, view, phase))
-        return cls(light, view, phase, above)
+        below = number(1.0, lit) - lit
+        result = cls(*(torch.addcmul(below, product, lit) for product in (light, view, phase)), above)
+        result.__dict__["lit"] = lit
+        return result
 
     @_computed_once
     def lit(self) -> Tensor:
         """1 where light and view are above the horizon, else 0 (...)."""
         return self.above_horizon.to(self.light.dtype)
 
+    @_computed_once
+    def parts(self) -> tuple[Components, Components, Components] | None:
+        """Components of normal, light and view, each (...), if the vectors are known."""
+        if self.vectors is None:
+            return None
+        normal, light, view = self.vectors
+        return components(normal), components(light), components(view)
+
     def zero_below_horizon(self, brdf: Tensor) -> Tensor:
         """brdf (..., channel), finite, where light and view are above the horizon, else 0 with zero gradient."""
-        return brdf * self.lit[..., None]
+        return brdf * self.lit.unsqueeze(-1)
 
     @_computed_once
     def half_phase(self) -> tuple[Tensor, Tensor]:
@@ -184,15 +203,32 @@ class Cosines:
         """Cosine of the smaller polar angle (...)."""
         return torch.maximum(self.light, self.view)
 
-    @_computed_once
-    def sin_alpha(self) -> Tensor:
-        """Sine of the larger polar angle (...); zero gradient at normal incidence."""
-        return sine(self.alpha)
+    def _of_both(self, function: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
+        """A function of one cosine at alpha and beta: in one go, for half the calls, except where calls cost nothing."""
+        if torch.compiler.is_compiling():
+            return function(self.alpha), function(self.beta)
+        of_alpha, of_beta = function(self._both).unbind(0)
+        return of_alpha, of_beta
 
     @_computed_once
+    def _both(self) -> Tensor:
+        """Cosines of alpha and beta (2, ...)."""
+        return torch.stack((self.alpha, self.beta))
+
+    @_computed_once
+    def sines(self) -> tuple[Tensor, Tensor]:
+        """Sines of alpha and beta, each (...); zero gradient at normal incidence."""
+        return self._of_both(sine)
+
+    @property
+    def sin_alpha(self) -> Tensor:
+        """Sine of the larger polar angle (...); zero gradient at normal incidence."""
+        return self.sines[0]
+
+    @property
     def sin_beta(self) -> Tensor:
         """Sine of the smaller polar angle (...); zero gradient at normal incidence."""
-        return sine(self.beta)
+        return self.sines[1]
 
     @_computed_once
     def in_plane(self) -> Tensor:
@@ -200,10 +236,15 @@ class Cosines:
         return self.phase - self.light * self.view
 
     @_computed_once
+    def sine_product(self) -> Tensor:
+        """sin(alpha) sin(beta) (...)."""
+        return self.sin_alpha * self.sin_beta
+
+    @_computed_once
     def across_plane(self) -> Tensor:
         """sin(alpha) sin(beta) (1 - |cos(dphi)|) (...); zero subgradient at dphi = 90 degrees."""
         # Rounding can leave the difference a hair below the zero that bounds it.
-        return (self.sin_alpha * self.sin_beta - self.in_plane.abs()).relu()
+        return (self.sine_product - self.in_plane.abs()).relu()
 
     @_computed_once
     def sine_ratio(self) -> Tensor:
@@ -211,14 +252,19 @@ class Cosines:
         return self.sin_beta / positive(self.sin_alpha)
 
     @_computed_once
-    def alpha_over_sine(self) -> Tensor:
-        """alpha/sin(alpha) (...), by a polynomial in the cosine."""
-        return angle_over_sine(self.alpha)
+    def angles_over_sines(self) -> tuple[Tensor, Tensor]:
+        """alpha/sin(alpha) and beta/sin(beta), each (...), by a polynomial in the cosine."""
+        return self._of_both(angle_over_sine)
 
-    @_computed_once
+    @property
+    def alpha_over_sine(self) -> Tensor:
+        """alpha/sin(alpha) (...)."""
+        return self.angles_over_sines[0]
+
+    @property
     def beta_over_sine(self) -> Tensor:
-        """beta/sin(beta) (...), by a polynomial in the cosine."""
-        return angle_over_sine(self.beta)
+        """beta/sin(beta) (...)."""
+        return self.angles_over_sines[1]
 
 
 def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
@@ -229,7 +275,7 @@ def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
     bitangent = cross(normal, _normalized("tangent", tangent))
     squared = dot(bitangent, bitangent)
     parallel = squared <= unit_tolerance(squared.dtype) ** 2
-    if not holds(~parallel):
+    if not (taken_on_trust() or holds(~parallel)):
         raise ValueError(
             f"tangent must not be parallel to the normal; {int(parallel.sum())} of {parallel.numel()} are. "
             "Choose a direction along the surface."
@@ -273,14 +319,14 @@ def _listed(vectors: dict[str, Tensor]) -> str:
     return f"{', '.join(names)} and {last}"
 
 
-def _check_unit(vectors: dict[str, Tensor], parts: list[Components]) -> None:
-    """One look at all of them, and a second at each once something is off."""
+def _check_unit(vectors: dict[str, Components]) -> None:
+    """One look at the extremes of all of them, and a second at each once something is off."""
     with torch.no_grad():
-        squares = [dot_of(v, v) for v in parts]
-        worst = [(squared - 1).abs().amax() for squared in squares if squared.numel()]
-        if not worst or holds(torch.stack(worst).amax() <= unit_tolerance(worst[0].dtype)):  # so that NaN is off
-            return
-    for name, squared in zip(vectors, squares, strict=True):
+        squares = {name: dot_of(v, v) for name, v in vectors.items()}
+        extremes = [limit for squared in squares.values() if squared.numel() for limit in torch.aminmax(squared)]
+        if not extremes or holds((torch.stack(extremes) - 1).abs() <= unit_tolerance(extremes[0].dtype)):
+            return  # the extremes of what holds a NaN are NaN, which is off
+    for name, squared in squares.items():
         off = ~((squared - 1).abs() <= unit_tolerance(squared.dtype))
         if not off.any():
             continue
@@ -296,7 +342,7 @@ def _check_unit(vectors: dict[str, Tensor], parts: list[Components]) -> None:
 def _normalized(name: str, v: Tensor) -> Tensor:
     largest = v.abs().amax(-1, keepdim=True).detach()  # keeps the squares from overflowing; cancels in the result
     usable = largest.isfinite() & (largest > 0)
-    if not holds(usable):
+    if not (taken_on_trust() or holds(usable)):
         bad = int((~usable).sum())
         raise ValueError(f"{name} must hold finite vectors of non-zero length; {bad} of {usable.numel()} do not.")
     scaled = v / largest
