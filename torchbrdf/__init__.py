@@ -14,11 +14,11 @@ import importlib
 import warnings
 
 from torchbrdf.brdf import BRDF, Option
+from torchbrdf.checks import unchecked
 from torchbrdf.directions import (
     Cosines,
     any_tangent,
 )
-from torchbrdf.checks import unchecked
 from torchbrdf.effects import (
     EFFECTS,
     simulated,

@@ -6,6 +6,7 @@ where the mathematics has a limit that floating point cannot take.
 
 import functools
 import math
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -21,7 +22,7 @@ _TIP = {torch.float64: 1e-12, torch.float32: 1e-6}
 
 
 def _angle_over_sine_polynomial(degree: int) -> tuple[float, ...]:
-    """Coefficients, highest power first, of acos(c)/sqrt(1 - c^2) in x = 1 - c, where it is a series of positive terms."""
+    """Coefficients, highest power first, of acos(c)/sqrt(1 - c^2) in x = 1 - c, where its series is positive."""
 
     def ratio(x):  # the half-angle form keeps its digits at c = 1
         return 2 * np.arctan2(np.sqrt(x), np.sqrt(2 - x)) / np.sqrt(x * (2 - x))
@@ -50,6 +51,11 @@ def _sine_excess_polynomial(degree: int) -> tuple[float, ...]:
 
 _ANGLE_OVER_SINE = {dtype: _angle_over_sine_polynomial(n) for dtype, n in _ANGLE_DEGREE.items()}
 _SINE_EXCESS = {dtype: _sine_excess_polynomial(n) for dtype, n in _ANGLE_DEGREE.items()}
+# Up to so many numbers an operation costs its call: two together cost half as much as one after the other. Beyond, what
+# costs is the memory they fill.
+FEW = 4096
+# Pixels at a time of an image: the numbers in between then stay in the processor's cache.
+PIECE = 2**16
 SUPPORTED_DTYPES = tuple(_ANGLE_DEGREE)
 
 
@@ -202,7 +208,7 @@ def polynomial(coefficients: tuple[float, ...], x: Tensor) -> Tensor:
 
 def quotients(x: Tensor, rows: tuple[tuple[float, float, float], ...]) -> tuple[Tensor, ...]:
     """(a x + b)/(x + c) (...) for each row (a, b, c), in one go."""
-    if torch.compiler.is_compiling():
+    if torch.compiler.is_compiling() or x.numel() > FEW:
         return tuple((a * x + b) / (x + c) for a, b, c in rows)
     a, b, c = _columns(rows, x.ndim, x.dtype, x.device)
     return (torch.addcmul(b, a, x) / (x + c)).unbind(0)
@@ -214,7 +220,31 @@ def _columns(
 ) -> tuple[Tensor, ...]:
     """The columns of a table, each (rows, 1, ...) with as many axes as a row and `ndim` more."""
     with torch.inference_mode(False):
-        return tuple(torch.tensor(column, dtype=dtype, device=device).view(-1, *(1,) * ndim) for column in zip(*rows))
+        columns = torch.tensor(rows, dtype=dtype, device=device).T.contiguous().unbind()
+        return tuple(column.view(-1, *(1,) * ndim) for column in columns)
+
+
+def in_pieces(compute: Callable[..., tuple[Tensor, ...]], *inputs: Tensor, own: int = 0) -> tuple[Tensor, ...]:
+    """compute(*inputs), tensors (...) made pixel by pixel: of an image some pixels at a time.
+
+    Fresh memory costs more than arithmetic; so each step takes the memory of the one before. As a whole where
+    derivatives are recorded, which keep the steps, or where shapes differ.
+
+    Args:
+        inputs: each (...) with `own` more axes, or those axes alone.
+    """
+    wide = max(inputs, key=lambda t: t.ndim)
+    shape = wide.shape[: wide.ndim - own]
+    recorded = torch.is_grad_enabled() and any(t.requires_grad for t in inputs)
+    if shape.numel() <= 2 * PIECE or torch.compiler.is_compiling() or recorded:
+        return compute(*inputs)
+    if not all(t.ndim == own or (t.shape[: t.ndim - own] == shape and t.is_contiguous()) for t in inputs):
+        return compute(*inputs)
+    count = -(-shape.numel() // PIECE)
+    rows = [[t] * count if t.ndim == own else t.flatten(0, len(shape) - 1).split(PIECE) for t in inputs]
+    results = zip(*(compute(*piece) for piece in zip(*rows, strict=True)), strict=True)
+    # what none of the wide inputs enters is () in each piece
+    return tuple(torch.cat(parts).view(shape) if parts[0].ndim else parts[0] for parts in results)
 
 
 def number(value: float, like: Tensor) -> Tensor:

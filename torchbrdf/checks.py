@@ -30,17 +30,23 @@ def unchecked() -> Iterator[None]:
     ...     Lambert(albedo=1.0)(up, up, 2 * up).item() > 0
     True
     """
-    before = _looking.set(False)
-    try:
+    with _set(False):
         yield
-    finally:
-        _looking.reset(before)
 
 
 @contextmanager
 def checked() -> Iterator[None]:
     """Looks all the same, also inside `unchecked()`: for what is stored and outlives it."""
-    before = _looking.set(True)
+    with _set(True):
+        yield
+
+
+@contextmanager
+def _set(looking: bool) -> Iterator[None]:
+    if torch.compiler.is_compiling():  # which cannot trace a context variable, and never looks
+        yield
+        return
+    before = _looking.set(looking)
     try:
         yield
     finally:

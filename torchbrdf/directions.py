@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
 from torchbrdf._numerics import (
+    FEW,
     SUPPORTED_DTYPES,
     Components,
     angle_over_sine,
@@ -17,6 +19,7 @@ from torchbrdf._numerics import (
     dot_of,
     holds,
     horizon,
+    in_pieces,
     length,
     number,
     positive,
@@ -101,12 +104,13 @@ class Cosines:
             _check_shapes(given if tangent is None else given | {"tangent": tangent})
         if normalize:
             normal, light, view = _normalized("normal", normal), _normalized("light", light), _normalized("view", view)
-        n, s, v = components(normal), components(light), components(view)
-        if not (normalize or taken_on_trust()):
-            _check_unit({"normal": n, "light": s, "view": v})
-        result = cls._from_components(n, s, v)
+        extremes: list[Tensor] | None = None if normalize or taken_on_trust() else []
+        products = in_pieces(partial(_products, extremes=extremes), normal, light, view, own=1)
+        if extremes and not holds((torch.stack(extremes) - 1).abs() <= unit_tolerance(normal.dtype)):
+            _refuse_other_than_unit(normal=normal, light=light, view=view)  # NaN too: extremes pass it on
+        result = cls.from_products(*products)
         # of a frozen instance that nobody has seen yet; `replace` would make another
-        result.__dict__.update(vectors=(normal, light, view), tangent=tangent, parts=(n, s, v))
+        result.__dict__.update(vectors=(normal, light, view), tangent=tangent)
         return result
 
     @classmethod
@@ -131,13 +135,12 @@ class Cosines:
         """1 where light and view are above the horizon, else 0 (...)."""
         return self.above_horizon.to(self.light.dtype)
 
-    @_computed_once
-    def parts(self) -> tuple[Components, Components, Components] | None:
-        """Components of normal, light and view, each (...), if the vectors are known."""
-        if self.vectors is None:
-            return None
-        normal, light, view = self.vectors
-        return components(normal), components(light), components(view)
+    def in_pieces(self, compute: "Callable[[Cosines], tuple[Tensor, ...]]") -> tuple[Tensor, ...]:
+        """compute(self), functions of light, view and phase pixel by pixel: of an image some pixels at a time."""
+        if self.light.numel() <= FEW:
+            return compute(self)
+        products = (self.light, self.view, self.phase, self.above_horizon)
+        return in_pieces(lambda *piece: compute(Cosines(*piece)), *products)
 
     def zero_below_horizon(self, brdf: Tensor) -> Tensor:
         """brdf (..., channel), finite, where light and view are above the horizon, else 0 with zero gradient."""
@@ -204,8 +207,8 @@ class Cosines:
         return torch.maximum(self.light, self.view)
 
     def _of_both(self, function: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
-        """A function of one cosine at alpha and beta: in one go, for half the calls, except where calls cost nothing."""
-        if torch.compiler.is_compiling():
+        """A function of a cosine at alpha and beta: in one go where calls cost more than numbers."""
+        if torch.compiler.is_compiling() or self.light.numel() > FEW:
             return function(self.alpha), function(self.beta)
         of_alpha, of_beta = function(self._both).unbind(0)
         return of_alpha, of_beta
@@ -229,6 +232,13 @@ class Cosines:
     def sin_beta(self) -> Tensor:
         """Sine of the smaller polar angle (...); zero gradient at normal incidence."""
         return self.sines[1]
+
+    @_computed_once
+    def tangents_squared(self) -> tuple[Tensor, Tensor]:
+        """tan^2 of the polar angles of light and view, each (...)."""
+        one = number(1.0, self.light)
+        light, view = (((one - c) * (one + c)).relu() / (c * c) for c in (self.light, self.view))
+        return light, view
 
     @_computed_once
     def in_plane(self) -> Tensor:
@@ -319,14 +329,20 @@ def _listed(vectors: dict[str, Tensor]) -> str:
     return f"{', '.join(names)} and {last}"
 
 
-def _check_unit(vectors: dict[str, Components]) -> None:
-    """One look at the extremes of all of them, and a second at each once something is off."""
-    with torch.no_grad():
-        squares = {name: dot_of(v, v) for name, v in vectors.items()}
-        extremes = [limit for squared in squares.values() if squared.numel() for limit in torch.aminmax(squared)]
-        if not extremes or holds((torch.stack(extremes) - 1).abs() <= unit_tolerance(extremes[0].dtype)):
-            return  # the extremes of what holds a NaN are NaN, which is off
-    for name, squared in squares.items():
+def _products(normal: Tensor, light: Tensor, view: Tensor, *, extremes: list[Tensor] | None) -> tuple[Tensor, ...]:
+    """The three dot products (...); appends the smallest and the largest squared length of each of the vectors."""
+    n, s, v = components(normal), components(light), components(view)
+    if extremes is not None:
+        with torch.no_grad():
+            squares = [dot_of(c, c) for c in (n, s, v)]
+            extremes += [limit for squared in squares if squared.numel() for limit in torch.aminmax(squared)]
+    return dot_of(n, s), dot_of(n, v), dot_of(s, v)
+
+
+def _refuse_other_than_unit(**vectors: Tensor) -> None:
+    """Raise ValueError for the first of the vectors (..., 3) that are not all of unit length: a second, slower look."""
+    for name, vector in vectors.items():
+        squared = dot(vector, vector).detach()
         off = ~((squared - 1).abs() <= unit_tolerance(squared.dtype))
         if not off.any():
             continue

@@ -1,6 +1,7 @@
 """Functional approximation of the integral of Oren & Nayar 1994, eqs. (27)-(29) of the long version."""
 
 import math
+from functools import partial
 from typing import Any, final
 
 import torch
@@ -16,7 +17,6 @@ from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
 from torchbrdf.models.rungs import Member, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
-
 
 # (4/pi^2)^2 of C3 and (2/pi)^2 of the second bounce, with beta squared.
 _ANGLES, _BOUNCE = (4 / math.pi**2) ** 2, (2 / math.pi) ** 2
@@ -60,10 +60,8 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
 
 def fields(cosines: Cosines, sigma: Tensor, *, c3: bool = True) -> tuple[Tensor, Tensor]:
     """Light reflected once and twice by white facets, Oren & Nayar 1994, eqs. (27) and (28), each (...). [1/sr]"""
-    along, across, turned = _shapes(cosines, c3=c3)
+    along, turned = cosines.in_pieces(partial(_two_shapes, c3=c3))
     flat, slope, bounce = quotients(sigma * sigma, _QUOTIENTS)
-    if across is not None:
-        along = torch.add(along, across, alpha=_C3 / _C2)
     return torch.addcmul(flat, slope, along), torch.addcmul(bounce, bounce, turned, value=-_BOUNCE)
 
 
@@ -77,6 +75,12 @@ def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor
     along, across, turned = _shapes(cosines, c3=c3)
     ones = torch.ones_like(along)
     return ones, along, 0 * ones if across is None else across * _ANGLES, turned * _BOUNCE
+
+
+def _two_shapes(cosines: Cosines, *, c3: bool) -> tuple[Tensor, Tensor]:
+    """What C2 multiplies, with the term of C3 in it, and the bounce without its power of 2/pi, each (...)."""
+    along, across, turned = _shapes(cosines, c3=c3)
+    return (along if across is None else torch.add(along, across, alpha=_C3 / _C2)), turned
 
 
 def _shapes(cosines: Cosines, *, c3: bool) -> tuple[Tensor, Tensor | None, Tensor]:
