@@ -233,10 +233,12 @@ def in_pieces(compute: Callable[..., tuple[Tensor, ...]], *inputs: Tensor, own: 
     Args:
         inputs: each (...) with `own` more axes, or those axes alone.
     """
+    if torch.compiler.is_compiling():
+        return compute(*inputs)
     wide = max(inputs, key=lambda t: t.ndim)
     shape = wide.shape[: wide.ndim - own]
     recorded = torch.is_grad_enabled() and any(t.requires_grad for t in inputs)
-    if shape.numel() <= 2 * PIECE or torch.compiler.is_compiling() or recorded:
+    if shape.numel() <= 2 * PIECE or recorded:
         return compute(*inputs)
     if not all(t.ndim == own or (t.shape[: t.ndim - own] == shape and t.is_contiguous()) for t in inputs):
         return compute(*inputs)
