@@ -83,13 +83,7 @@ class HalfVector:
     def of(cls, cosines: Cosines) -> "HalfVector":
         up = cosines.light + cosines.view
         if cosines.tangent is not None:
-            plane = cosines.tangent_plane
-            along = plane.light_tangent + plane.view_tangent
-            across = plane.light_bitangent + plane.view_bitangent
-            flat = along * along + across * across
-            squared = flat + up * up
-            length = squared.sqrt()
-            return cls(up / length, flat / squared, length / 2, along / length, across / length)
+            return cls(*in_pieces(_along_tangent, *cosines.tangent_plane, up))
         if cosines.vectors is not None:
             (flat,) = in_pieces(_planar_squared, *cosines.vectors, own=1)
             flat = flat * cosines.lit
@@ -111,6 +105,17 @@ class HalfVector:
         if self.tangent is None or self.bitangent is None:
             raise ValueError("an anisotropic distribution needs a tangent: pass tangent=... to Cosines.of.")
         return (self.tangent / alpha_x) ** 2 + (self.bitangent / alpha_y) ** 2
+
+
+def _along_tangent(
+    light_tangent: Tensor, light_bitangent: Tensor, view_tangent: Tensor, view_bitangent: Tensor, up: Tensor
+) -> tuple[Tensor, ...]:
+    """The half vector from a `TangentPlane` and the part of light + view along the normal, each (...)."""
+    along, across = light_tangent + view_tangent, light_bitangent + view_bitangent
+    flat = torch.addcmul(along * along, across, across)
+    squared = torch.addcmul(flat, up, up)
+    length = squared.sqrt()
+    return up / length, flat / squared, length / 2, along / length, across / length
 
 
 def _planar_squared(normal: Tensor, light: Tensor, view: Tensor) -> tuple[Tensor]:

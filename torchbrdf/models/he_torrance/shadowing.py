@@ -17,6 +17,7 @@ from torch import Tensor
 
 # exp(-b^2) and erfc(b) are below 1e-35 beyond: nothing is hidden. Holds normal incidence and sigma0 = 0.
 _OPEN = 9.0
+_HIDDEN_WHERE_OPEN = 4.2e-37  # erfc of it, and a little more
 
 
 class Shadowing(NamedTuple):
@@ -40,5 +41,7 @@ def shadowing(cos: Tensor, sin: Tensor, *, sigma0: Tensor, tau: Tensor) -> Shado
     slope = tau / torch.maximum(2 * sigma0 * sin, run / _OPEN)  # b = slope cos
     b = slope * cos
     sides = math.sqrt(math.pi) * (1 + torch.erf(b))
-    over_cos = slope * sides / (b * sides + (-b * b).exp())
-    return Shadowing(over_cos, over_cos * cos, sin / cos * torch.erfc(b))
+    seen = b * sides
+    all_of_it = seen + (-b * b).exp()
+    hidden = torch.threshold(torch.erfc(b), _HIDDEN_WHERE_OPEN, 0.0)
+    return Shadowing(slope * sides / all_of_it, seen / all_of_it, sin / cos * hidden)
