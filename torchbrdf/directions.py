@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import torch
 from torch import Tensor
@@ -127,7 +127,8 @@ class Cosines:
         # multiplied and added, which takes a fifth of the time of a masked fill
         lit = above.to(light.dtype)
         below = number(1.0, lit) - lit
-        result = cls(*(torch.addcmul(below, product, lit) for product in (light, view, phase)), above)
+        light, view, phase = (torch.addcmul(below, product, lit) for product in (light, view, phase))
+        result = cls(light, view, phase, above)
         result.__dict__["lit"] = lit
         return result
 
@@ -354,9 +355,17 @@ def _listed(vectors: dict[str, Tensor]) -> str:
 def _products(normal: Tensor, light: Tensor, view: Tensor, *, extremes: list[Tensor] | None) -> tuple[Tensor, ...]:
     """The three dot products (...); appends the smallest and the largest squared length of each of the vectors."""
     # sums over an axis of three: as fast as they are slow for many, and never fused when compiled
-    few = not torch.compiler.is_compiling() and light.numel() <= FEW
-    n, s, v = (normal, light, view) if few else (components(normal), components(light), components(view))
-    product: Callable[[Any, Any], Tensor] = _sum_of_products if few else dot_of
+    if torch.compiler.is_compiling() or light.numel() > FEW:
+        return _dots(dot_of, components(normal), components(light), components(view), extremes)
+    return _dots(_sum_of_products, normal, light, view, extremes)
+
+
+_Vector = TypeVar("_Vector", Tensor, Components)
+
+
+def _dots(
+    product: Callable[[_Vector, _Vector], Tensor], n: _Vector, s: _Vector, v: _Vector, extremes: list[Tensor] | None
+) -> tuple[Tensor, ...]:
     if extremes is not None:
         with torch.no_grad():
             squares = [product(c, c) for c in (n, s, v)]

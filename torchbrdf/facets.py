@@ -123,8 +123,8 @@ def _planar_squared(normal: Tensor, light: Tensor, view: Tensor) -> tuple[Tensor
     n, s, v = components(normal), components(light), components(view)
     total = s[0] + v[0], s[1] + v[1], s[2] + v[2]
     along = dot_of(total, n)
-    planar = tuple(torch.addcmul(t, along, axis, value=-1) for t, axis in zip(total, n, strict=True))
-    return (dot_of(planar, planar),)
+    x, y, z = (torch.addcmul(t, along, axis, value=-1) for t, axis in zip(total, n, strict=True))
+    return (dot_of((x, y, z), (x, y, z)),)
 
 
 def v_cavity_masking(cosines: Cosines, half: HalfVector) -> Tensor:
