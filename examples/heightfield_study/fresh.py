@@ -74,29 +74,43 @@ def fast_row(model: LibraryModel, sample: Sample) -> str:
     return "  closed form".ljust(24 + 56) + "".join(cells)
 
 
+def keep(samples: Sequence[Sample], path: Path) -> None:
+    """What tests read: f_2 with its standard error and the full BRDF at rho 0.9, dphi in [0, pi], single precision."""
+    half = AZIMUTHS // 2 + 1
+    arrays = {"theta": POLAR}
+    for sample in samples:
+        values = {"f2": sample.f[1], "f2_se": sample.f_se[1], "full_0.9": sample.total(0.9)}
+        arrays |= {f"{sample.slope:g}_{name}": f[..., :half].astype(np.float32) for name, f in values.items()}
+    np.savez_compressed(path, **arrays)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--surfaces", type=int, default=16)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--output", type=Path, default=Path("output/heightfield_study"))
+    parser.add_argument("--keep", type=Path, help="write what tests read of the first three cases to this file")
     arguments = parser.parse_args()
     torch.set_num_threads(1)
     model = LibraryModel.at(POLAR, AZIMUTHS)
     neighbours = replace(model, transport=NEIGHBOURING_FACETS)
-    print("%: rms +- standard error (largest; noise of the data)".ljust(24) + "".join(p.ljust(28) for p in PARTS))
-    for number, (title, spectrum, slope) in enumerate(cases()):
+    print("Relative error, %: rms +- standard error (largest; noise of the data)")
+    print("".ljust(24) + "".join(p.ljust(28) for p in PARTS))
+    judged = []
+    for number, (case, spectrum, slope) in enumerate(cases()):
         plan = Plan(arguments.surfaces, length=21, cells=(8, 16), paths=6, bounces=24, seed=FIRST_SEED + number)
-        name = title.replace(" ", "_") if spectrum is not surfaces.gaussian else "gaussian"
+        name = case.replace(" ", "_") if spectrum is not surfaces.gaussian else "gaussian"
         place = {"folder": arguments.output / "fresh", "processes": arguments.processes}
         sample = traced(f"{name}_{slope:.4g}", plan, spectrum, slope, **place).limit
-        e = 1.0
-        if spectrum is not surfaces.gaussian:
-            e = occlusion(model, model.constants, [sample]).values.item()
-            title = f"{title}, E = {e:.2f}"
-        print(row(title, model, sample, e))
+        judged.append(sample)
+        smooth = spectrum is surfaces.gaussian
+        e = 1.0 if smooth else occlusion(model, model.constants, [sample]).values.item()
+        print(row(case if smooth else f"{case}, E = {e:.2f}", model, sample, e))
         print(row("  neighbouring facets", neighbours, sample, e))
-        if spectrum is surfaces.gaussian:
+        if smooth:
             print(fast_row(model, sample))
+    if arguments.keep:
+        keep(judged[: len(SLOPES)], arguments.keep)
 
 
 if __name__ == "__main__":

@@ -91,9 +91,9 @@ def gaussian_heightfield(
     Raises: ValueError outside the domains, or for other nodes or bounces.
     Deviations: the slope integral errs by up to 7e-4, 8e-5, 4e-5, 9e-6 at 160, 240, 384, 560 nodes, the table by up to
         1e-3 of f. White facets return 1 within 1e-3 up to 89 deg. Path-traced meshes up to 80 deg, rho = 0.9: within
-        0.3, 0.8, 1.1 % rms at s = 0.3, 0.67, 1, most of it in the bounces, which are blind to occlusion; two
-        scales at occlusion 1.6: f_1 within 0.8 %. The cone at light = view has subgradient 0. A field of sigma costs a
-        table for each entry unless bounces = 1.
+        0.3, 0.8, 1.1 % rms at s = 0.3, 0.67, 1, most of it in the bounces, which are blind to occlusion; with
+        `NEIGHBOURING_FACETS` 0.25, 0.6, 0.7 %. Two scales at occlusion 1.6: f_1 within 0.8 %. The cone at light = view
+        has subgradient 0. A field of sigma costs a table for each entry unless bounces = 1.
     Source: own; see `docs/heightfield.md` for what it is built on.
     """
     ALBEDO.check("gaussian_heightfield: albedo", albedo)
@@ -112,7 +112,7 @@ def heightfield_fields(cosines: Cosines, sigma: Tensor, occlusion: Tensor, setti
     direct = direct_light(slope_frame(cosines, slope), occlusion, settings.constants, quadrature)[..., None]
     if settings.orders == 0:
         return direct
-    table = bounce_table(sigma, occlusion, settings.constants, quadrature, settings.size, settings.transport)
+    table = bounce_table(sigma, occlusion, settings.constants, quadrature, settings.size, transport=settings.transport)
     bounced = read_table(cosines, table, settings.size)[..., : settings.orders]
     return torch.cat((direct, bounced.expand(*direct.shape[:-1], settings.orders)), -1)
 

@@ -37,6 +37,7 @@ def bounce_table(
     constants: HeightfieldConstants,
     quadrature: Quadrature,
     size: TableSize,
+    *,
     transport: Transport = INDEPENDENT_FACETS,
 ) -> Tensor:
     """Legendre coefficients (..., polar^2, M orders) in float64 of F_0 and 2 F_m/(sin_i sin_r)^m, n = 2 .. orders + 1.
@@ -46,8 +47,8 @@ def bounce_table(
     """
     numbers = _plain(sigma), _plain(occlusion)
     if numbers[0] is None or numbers[1] is None:
-        return _table(sigma.double(), occlusion.double(), constants, quadrature, size, transport)
-    return kept_table(numbers[0], numbers[1], constants, quadrature, size, transport).to(sigma.device)
+        return _table(sigma.double(), occlusion.double(), constants, quadrature, size, transport=transport)
+    return kept_table(numbers[0], numbers[1], constants, quadrature, size, transport=transport).to(sigma.device)
 
 
 def _plain(value: Tensor) -> float | None:
@@ -67,12 +68,13 @@ def kept_table(
     constants: HeightfieldConstants,
     quadrature: Quadrature,
     size: TableSize,
+    *,
     transport: Transport,
 ) -> Tensor:
     """The table of a material given by numbers, which is kept."""
     with torch.no_grad():
         first, second = (torch.tensor(value, dtype=torch.float64) for value in (sigma, occlusion))
-        return _table(first, second, constants, quadrature, size, transport)
+        return _table(first, second, constants, quadrature, size, transport=transport)
 
 
 def _table(
@@ -81,6 +83,7 @@ def _table(
     constants: HeightfieldConstants,
     quadrature: Quadrature,
     size: TableSize,
+    *,
     transport: Transport,
 ) -> Tensor:
     sigma, occlusion = torch.broadcast_tensors(sigma, occlusion)
