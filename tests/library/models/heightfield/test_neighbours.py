@@ -167,7 +167,7 @@ def test_a_transport_of_your_own_joins():
 
 @pytest.mark.parametrize(("name", "full"), [("t12_0.3", 0.0025), ("t12_0.67", 0.006), ("t12_1", 0.007)])
 def test_surfaces_not_fitted_to_have_half_the_error(name, full):
-    # The constants were fitted to surfaces of 6 cells a correlation length.
+    # The constants were fitted to surfaces of 6 cells a correlation length; the form was chosen with these in view.
     slope, directions, truth = traced(name)
     errors = {}
     for transport in (INDEPENDENT_FACETS, NEIGHBOURING_FACETS):
