@@ -69,8 +69,8 @@ def models_of(rough: Tensor, albedo: Tensor) -> dict[str, BRDF]:
     """By name, of roughness (pixel,) in [0.1, 0.8] and albedo (pixel, 3), or of single ones."""
     dim = 0.5 * albedo
     shiny = 10 / rough
-    anisotropic = {"alpha_x": rough, "alpha_y": 1.2 * rough}
-    lengths = {"tau": fixed(3.0), "wavelength": fixed(torch.tensor([0.65, 0.55, 0.45])), "eta": fixed(1.5)}
+    wide = 1.2 * rough
+    wavelength = fixed(torch.tensor([0.65, 0.55, 0.45]))
     return {
         "Lambert": Lambert(albedo=albedo),
         "OrenNayar": OrenNayar(albedo=albedo, sigma=rough),
@@ -89,13 +89,13 @@ def models_of(rough: Tensor, albedo: Tensor) -> dict[str, BRDF]:
         "MaxCosinePhong": MaxCosinePhong(diffuse=dim, specular=dim, exponent=shiny),
         "AshikhminShirley": AshikhminShirley(diffuse=dim, specular=dim, exponent_x=shiny, exponent_y=2 * shiny),
         "GGX": GGX(alpha=rough),
-        "AnisotropicGGX": AnisotropicGGX(**anisotropic),
+        "AnisotropicGGX": AnisotropicGGX(alpha_x=rough, alpha_y=wide),
         "Beckmann": Beckmann(alpha=rough),
-        "AnisotropicBeckmann": AnisotropicBeckmann(**anisotropic),
+        "AnisotropicBeckmann": AnisotropicBeckmann(alpha_x=rough, alpha_y=wide),
         "TorranceSparrow": TorranceSparrow(sigma=rough),
         "FastGaussianHeightfield": FastGaussianHeightfield(albedo=albedo, sigma=rough),
         "FastRoughSurface": FastRoughSurface(albedo=albedo, sigma=rough),
-        "HeTorrance": HeTorrance(sigma0=rough, **lengths),
+        "HeTorrance": HeTorrance(sigma0=rough, tau=fixed(3.0), wavelength=wavelength, eta=fixed(1.5)),
     }
 
 
