@@ -5,11 +5,14 @@ where the mathematics has a limit that floating point cannot take.
 """
 
 import math
+from functools import cache
 
 import numpy as np
 import torch
 from numpy.polynomial import Chebyshev, Polynomial
 from torch import Tensor
+
+from torchbrdf._constants import constant
 
 # acos(c)/sqrt(1 - c^2) is analytic on [0, 1]; interpolation there errs by about 6^-degree.
 _ANGLE_DEGREE = {torch.float64: 20, torch.float32: 9}
@@ -19,18 +22,22 @@ _UNIT_TOLERANCE_IN_EPS = 64
 _TIP = {torch.float64: 1e-12, torch.float32: 1e-6}
 
 
-def _angle_over_sine_polynomial(degree: int) -> tuple[float, ...]:
+@constant
+@cache
+def _angle_over_sine_polynomial(dtype: torch.dtype) -> tuple[float, ...]:
     """Coefficients, highest power first, of acos(c)/sqrt(1 - c^2) in the variable x = 2c - 1."""
 
     def ratio(x):  # the half-angle form keeps its digits at c = 1
         c = (1 + x) / 2
         return 2 * np.arctan2(np.sqrt(1 - c), np.sqrt(1 + c)) / np.sqrt((1 - c) * (1 + c))
 
-    in_powers = Chebyshev.interpolate(ratio, degree).convert(kind=Polynomial)
+    in_powers = Chebyshev.interpolate(ratio, _ANGLE_DEGREE[dtype]).convert(kind=Polynomial)
     return tuple(float(k) for k in in_powers.coef[::-1])
 
 
-def _sine_excess_polynomial(degree: int) -> tuple[float, ...]:
+@constant
+@cache
+def _sine_excess_polynomial(dtype: torch.dtype) -> tuple[float, ...]:
     """Coefficients, highest power first, of (1 - c acos(c)/sqrt(1 - c^2))/(1 - c^2) in x = 2c - 1."""
 
     def excess(x):
@@ -44,12 +51,10 @@ def _sine_excess_polynomial(degree: int) -> tuple[float, ...]:
             series, term = series + term, term * sine_squared * (2 * k) / (2 * k + 3)
         return np.where(sine_squared < 0.3, series, closed)
 
-    in_powers = Chebyshev.interpolate(excess, degree).convert(kind=Polynomial)
+    in_powers = Chebyshev.interpolate(excess, _ANGLE_DEGREE[dtype]).convert(kind=Polynomial)
     return tuple(float(k) for k in in_powers.coef[::-1])
 
 
-_ANGLE_OVER_SINE = {dtype: _angle_over_sine_polynomial(n) for dtype, n in _ANGLE_DEGREE.items()}
-_SINE_EXCESS = {dtype: _sine_excess_polynomial(n) for dtype, n in _ANGLE_DEGREE.items()}
 SUPPORTED_DTYPES = tuple(_ANGLE_DEGREE)
 
 
@@ -178,12 +183,12 @@ def angle_over_sine(cosine: Tensor) -> Tensor:
 
     Relative error below 5e-15 in float64 and 2e-7 in float32.
     """
-    return _polynomial(_ANGLE_OVER_SINE[cosine.dtype], 2 * cosine - 1)
+    return _polynomial(_angle_over_sine_polynomial(cosine.dtype), 2 * cosine - 1)
 
 
 def sine_excess(cosine: Tensor) -> Tensor:
     """(sin(theta) - theta cos(theta))/sin^3(theta) for cos(theta) in [0, 1]: 1/3 at theta = 0, smooth there."""
-    return _polynomial(_SINE_EXCESS[cosine.dtype], 2 * cosine - 1)
+    return _polynomial(_sine_excess_polynomial(cosine.dtype), 2 * cosine - 1)
 
 
 def _polynomial(coefficients: tuple[float, ...], x: Tensor) -> Tensor:

@@ -21,6 +21,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from torchbrdf._constants import constant
 from torchbrdf._numerics import safe_divide, safe_sqrt
 from torchbrdf.models.heightfield.direct import Quadrature, direct_light
 from torchbrdf.models.heightfield.slope_frame import SlopeFrame
@@ -98,6 +99,7 @@ def smith_modes(slope: Tensor, nodes: Polar, orders: int) -> Tensor:
     return torch.stack(scattered[1:], -4) / (nodes.cos[:, None] * nodes.cos) * damping[..., None, None]
 
 
+@constant
 @lru_cache(maxsize=1)
 def _slope_rule() -> tuple[list[float], list[float]]:
     """Slopes over their rms and their shares."""
