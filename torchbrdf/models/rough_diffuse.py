@@ -85,8 +85,12 @@ class _RoughDiffuse(CltcSampled, FieldBRDF, LinearBRDF):
 
     def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
         """White FON (...). [1/sr]"""
+        (retro,) = cosines.in_pieces(lambda g: (retro_term(g),))
+        return (self._white(retro),)
+
+    def _white(self, retro: Tensor) -> Tensor:
         r = self.roughness
-        return ((1 + r * retro_term(cosines)) / (math.pi * (1 + C1 * r)),)
+        return (1 + r * retro) / (math.pi * (1 + C1 * r))
 
     def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
         return {"direct": torch.atleast_1d(self.albedo) * fields[0]}
@@ -172,8 +176,9 @@ class EON(_RoughDiffuse):
 
     def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
         """White FON, and what comes of the light it loses (...). [1/sr]"""
+        retro, lost = cosines.in_pieces(lambda g: (retro_term(g), self._lost(g)))
         r = self.roughness
-        return (*super().fields(cosines), r / (math.pi * (1 + C1 * r)) * self._lost(cosines))
+        return self._white(retro), r / (math.pi * (1 + C1 * r)) * lost
 
     def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
         return super().parts_of(fields[0]) | {"interreflection": self._returned() * fields[1]}
