@@ -80,6 +80,8 @@ Components = tuple[Tensor, Tensor, Tensor]
 def components(vector: Tensor) -> Components:
     """x, y and z (...) of vectors (..., 3), each in one piece of memory: strided ones take five times as long."""
     x, y, z = vector.unbind(-1)
+    if torch.compiler.is_compiling():  # the compiled loop reads them where they are
+        return x, y, z
     return (x.contiguous(), y.contiguous(), z.contiguous()) if vector.is_contiguous() else (x, y, z)
 
 
@@ -238,10 +240,12 @@ def in_pieces(compute: Callable[..., tuple[Tensor, ...]], *inputs: Tensor, own: 
     Args:
         inputs: each (...) with `own` more axes, or those axes alone.
     """
+    if torch.compiler.is_compiling():
+        return compute(*inputs)
     wide = max(inputs, key=lambda t: t.ndim)
     shape = wide.shape[: wide.ndim - own]
     recorded = torch.is_grad_enabled() and any(t.requires_grad for t in inputs)
-    if shape.numel() <= 2 * PIECE or torch.compiler.is_compiling() or recorded:
+    if shape.numel() <= 2 * PIECE or recorded:
         return compute(*inputs)
     if not all(t.ndim == own or (t.shape[: t.ndim - own] == shape and t.is_contiguous()) for t in inputs):
         return compute(*inputs)

@@ -51,7 +51,8 @@ class _computed_once:  # noqa: N801 - used as a decorator
 
     def __get__(self, instance: "Cosines", owner: type) -> Any:
         value = self.compute(instance)
-        if torch.is_grad_enabled() or not (instance.light.requires_grad or torch.is_inference_mode_enabled()):
+        kept_without = torch.compiler.is_compiling() or not torch.is_inference_mode_enabled()
+        if torch.is_grad_enabled() or (kept_without and not instance.light.requires_grad):
             instance.__dict__[self.name] = value  # found before this descriptor from now on
         return value
 
