@@ -138,7 +138,7 @@ class Cosines:
 
     def in_pieces(self, compute: "Callable[[Cosines], tuple[Tensor, ...]]") -> tuple[Tensor, ...]:
         """compute(self), functions of light, view and phase pixel by pixel: of an image some pixels at a time."""
-        if self.light.numel() <= FEW:
+        if torch.compiler.is_compiling() or self.light.numel() <= FEW:
             return compute(self)
         products = (self.light, self.view, self.phase, self.above_horizon)
         return in_pieces(lambda *piece: compute(Cosines(*piece)), *products)

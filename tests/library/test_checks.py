@@ -86,9 +86,11 @@ def test_belongs_to_one_thread():
 
 
 def test_a_compiled_function_may_enter_it():
+    brdf = Lambert()
+
     def shade(normal, light, view):
         with unchecked():
-            return 2 * Lambert()(normal, light, view)
+            return 2 * brdf(normal, light, view)
 
     directions = random_directions(4, generator=torch.Generator().manual_seed(0))
     compiled = torch.compile(shade, backend="eager", fullgraph=True)
