@@ -19,6 +19,8 @@ from inverse.fitting.unknowns import Unknowns
 
 # Few enough that their float64 copies stay in the cache.
 _PIXELS_AT_A_TIME = 16384
+# How much larger than the rounding that shows may be that which does not.
+_ROUNDING = 4
 
 
 def condensed(
@@ -99,10 +101,17 @@ def gram(basis: Tensor, recorded: Tensor, used: Tensor) -> Tensor:
 
 
 def _root(matrix: Tensor) -> Tensor:
-    """R (..., n, n) of a positive matrix R'R (..., n, n); what rounding left below 0 is 0."""
+    """R (..., n, n) of a positive matrix R'R (..., n, n), without directions that are lost in the rounding of the sums.
+
+    Kept, their rounding would be residuals that no step can lessen and that a perfect fit chases for ever.
+    """
     if not matrix.isfinite().all():  # for the fit to say so
         return matrix
     diagonal = matrix.diagonal(dim1=-2, dim2=-1)
     size = torch.where(diagonal > 0, diagonal, 1.0).sqrt()
     values, vectors = torch.linalg.eigh(matrix / (size[..., :, None] * size[..., None, :]))
-    return values.relu().sqrt()[..., :, None] * vectors.mT * size[..., None, :]
+    rounding = (-values[..., :1]).clamp(
+        min=matrix.shape[-1] * torch.finfo(matrix.dtype).eps
+    )  # none is negative otherwise
+    lost = values <= _ROUNDING * rounding
+    return values.masked_fill(lost, 0.0).sqrt()[..., :, None] * vectors.mT * size[..., None, :]

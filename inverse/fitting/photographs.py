@@ -122,7 +122,7 @@ def fit(
     warnings = warnings_of(scene.sensor, predicted, predicted - recorded, used, unknown_values)
     return judged(
         model, unknowns, best, samples=samples, clipped=int(first_used.sum()) - samples, warnings=warnings,
-        unit="of full scale", throw=throw, began=began,
+        unit="of full scale", throw=throw, began=began, mask=scene.surface.mask if scene.surface.samples == 1 else None,
     )  # fmt: skip
 
 
@@ -148,6 +148,7 @@ def judged(
     began: float,
     clipped: int = 0,
     warnings: tuple[str, ...] = (),
+    mask: Tensor | None = None,
 ) -> FitResult:
     """What a solution says; `model` receives the parameters found.
 
@@ -157,11 +158,12 @@ def judged(
         warnings: what the residuals say against it.
         unit: of the residuals.
         began: `time.perf_counter()` of the caller's start.
+        mask: of the result.
     Raises: FitError when it diverged, unless `throw` is false.
     """
     seconds = time.perf_counter() - began
     result = _result(unknowns, best, model, samples=samples, clipped=clipped, unit=unit, seconds=seconds)
-    result = replace(result, warnings=warnings)
+    result = replace(result, warnings=warnings, mask=mask)
     if result.status == "diverged" and throw:
         raise FitError(result)
     return result
@@ -247,4 +249,5 @@ def _result(
         model=model,
         history=best.history,
         residual_unit=unit,
+        mask=None,
     )

@@ -4,7 +4,7 @@ import pytest
 import torch
 from helpers.photographs import LIGHTS
 
-from inverse import Ambient, Distant, Scene, Sensor, fit, render, sphere
+from inverse import Ambient, Distant, Scene, Sensor, fit, plane, render, sphere
 from inverse.fitting.gram import condensed, gram
 from inverse.fitting.levenberg_marquardt import NormalEquations, Residuals
 from inverse.fitting.prediction import predictor
@@ -82,6 +82,15 @@ def test_a_fit_is_that_of_the_pixels(how):
         torch.testing.assert_close(one.standard_error[name], other.standard_error[name], rtol=1e-6, atol=0)
     assert (one.status, one.samples, one.clipped) == (other.status, other.samples, other.clipped)
     assert one.residual_rms == pytest.approx(other.residual_rms, rel=1e-9)
+
+
+def test_a_perfect_fit_is_not_chased():
+    """A plane under one light: every pixel is the same, and rounding of the sums is all that is left."""
+    scene = Scene(plane(24, 24, dtype=D), [Distant.from_angle(0)], Sensor(exposure=3.0))
+    photographs = render(scene, OrenNayar(albedo=number(0.7), sigma=number(0.7))).detach() * 3
+    result = fit(scene, photographs, OrenNayar(albedo=number([0.5]), sigma=number(0.3)))
+    assert result.status == "not identified"
+    assert result.iterations < 15
 
 
 def test_models_without_a_basis_and_per_texel_materials_go_through_the_pixels():
