@@ -102,6 +102,11 @@ def cross(a: Tensor, b: Tensor) -> Tensor:
     return torch.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), -1)
 
 
+def cross_of(a: Components, b: Components) -> Components:
+    """Cross product of vectors given by their components: exactly 0 for a vector and itself."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
 def length(vector: Tensor) -> Tensor:
     """Length (...) of vectors (..., 3), with zero gradient where it is 0."""
     return safe_sqrt(dot(vector, vector))
@@ -116,9 +121,14 @@ def safe_sqrt(x: Tensor) -> Tensor:
 def sine(cosine: Tensor) -> Tensor:
     """Sine of an angle in [0, pi/2] from its cosine: 0 with zero gradient where the cosine is 1, or a hair above."""
     below_one = number(1.0, cosine) - cosine
-    root = positive(torch.addcmul(below_one, below_one, cosine)).sqrt()  # (1 - c)(1 + c)
-    # puts the exact 0 back: its root is a power of 2, the same in any arithmetic; a masked fill takes ten times as long
-    return torch.threshold(root, math.sqrt(torch.finfo(root.dtype).tiny), 0.0)
+    return root(torch.addcmul(below_one, below_one, cosine))  # (1 - c)(1 + c)
+
+
+def root(x: Tensor) -> Tensor:
+    """`safe_sqrt` up to second derivatives, in a fifth of its time: 0 with zero gradient below all normal numbers."""
+    value = positive(x).sqrt()
+    # puts the exact 0 back: the root of that number is a power of 2, the same in any arithmetic
+    return torch.threshold(value, math.sqrt(torch.finfo(x.dtype).tiny), 0.0)
 
 
 def soft_sqrt(x: Tensor) -> Tensor:

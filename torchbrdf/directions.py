@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import torch
 from torch import Tensor
@@ -15,14 +15,15 @@ from torchbrdf._numerics import (
     angle_over_sine,
     components,
     cross,
+    cross_of,
     dot,
     dot_of,
     holds,
     horizon,
     in_pieces,
-    length,
     number,
     positive,
+    root,
     safe_sqrt,
     sine,
     unit_tolerance,
@@ -155,7 +156,8 @@ class Cosines:
         # multiplied and added, which takes a fifth of the time of a masked fill
         lit = above.to(light.dtype)
         below = number(1.0, lit) - lit
-        result = cls(*(torch.addcmul(below, product, lit) for product in (light, view, phase)), above)
+        light, view, phase = (torch.addcmul(below, product, lit) for product in (light, view, phase))
+        result = cls(light, view, phase, above)
         result.__dict__["lit"] = lit
         return result
 
@@ -184,12 +186,8 @@ class Cosines:
         """
         if self.vectors is None:
             return safe_sqrt((1 - self.phase) / 2), safe_sqrt((1 + self.phase) / 2)
-        _, light, view = self.vectors
-        below = ~self.above_horizon
-        return (
-            (length(light - view) / 2).masked_fill(below, 0.0),
-            (length(light + view) / 2).masked_fill(below, 1.0),
-        )
+        away, toward = in_pieces(_half_lengths, *self.vectors[1:], own=1)
+        return away * self.lit, torch.addcmul(number(1.0, self.lit) - self.lit, toward, self.lit)
 
     @_computed_once
     def azimuth_sine(self) -> Tensor:
@@ -216,14 +214,11 @@ class Cosines:
                 "an anisotropic model needs a tangent: pass tangent=(..., 3), a direction along the surface, "
                 "to the model or to Cosines.of."
             )
-        normal, *directions = self.vectors
-        tangent = orthonormal_tangent(normal, self.tangent)
-        bitangent = cross(normal, tangent)
-        below = ~self.above_horizon
-        # n x s is s turned by 90 degrees about the normal: exactly 0 where both are one
-        turned = [cross(normal, direction) for direction in directions]
-        parts = [part for t in turned for part in (dot(bitangent, t), -dot(tangent, t))]
-        return TangentPlane(*(part.masked_fill(below, 0.0) for part in parts))
+        least: list[Tensor] | None = None if taken_on_trust() else []
+        parts = in_pieces(partial(_in_tangent_plane, least=least), *self.vectors, self.tangent, own=1)
+        if least and not holds(torch.stack(least) > unit_tolerance(self.light.dtype) ** 2):
+            orthonormal_tangent(self.vectors[0], self.tangent)  # says what is wrong
+        return TangentPlane(*(part * self.lit for part in parts))
 
     @_computed_once
     def alpha(self) -> Tensor:
@@ -306,6 +301,34 @@ class Cosines:
         return self.angles_over_sines[1]
 
 
+def _half_lengths(light: Tensor, view: Tensor) -> tuple[Tensor, Tensor]:
+    """|light - view|/2 and |light + view|/2 (...)."""
+    s, v = components(light), components(view)
+    difference = s[0] - v[0], s[1] - v[1], s[2] - v[2]
+    total = s[0] + v[0], s[1] + v[1], s[2] + v[2]
+    return root(dot_of(difference, difference)) / 2, root(dot_of(total, total)) / 2
+
+
+def _in_tangent_plane(
+    normal: Tensor, light: Tensor, view: Tensor, tangent: Tensor, *, least: list[Tensor] | None
+) -> tuple[Tensor, ...]:
+    """The parts of a `TangentPlane`; appends the least squared sine between normal and tangent."""
+    n, s, v, t = components(normal), components(light), components(view), components(tangent)
+    # keeps the squares from overflowing; cancels in the result
+    largest = torch.maximum(torch.maximum(t[0].abs(), t[1].abs()), t[2].abs()).detach()
+    t = t[0] / largest, t[1] / largest, t[2] / largest
+    bitangent = cross_of(n, t)
+    squared = dot_of(bitangent, bitangent)
+    if least is not None and squared.numel():
+        with torch.no_grad():
+            least.append((squared / dot_of(t, t)).amin())
+    across = squared.rsqrt()
+    tangent_along = cross_of(bitangent, n)
+    # n x s is s turned by 90 degrees about the normal: exactly 0 where both are one
+    turned = [cross_of(n, direction) for direction in (s, v)]
+    return tuple(part * across for u in turned for part in (dot_of(bitangent, u), -dot_of(tangent_along, u)))
+
+
 def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
     """Unit vector (..., 3) along the part of `tangent` that is perpendicular to the unit normal.
 
@@ -372,12 +395,27 @@ def _listed(vectors: dict[str, Tensor]) -> str:
 
 def _products(normal: Tensor, light: Tensor, view: Tensor, *, extremes: list[Tensor] | None) -> tuple[Tensor, ...]:
     """The three dot products (...); appends the smallest and the largest squared length of each of the vectors."""
-    n, s, v = components(normal), components(light), components(view)
+    # sums over an axis of three: as fast as they are slow for many, and never fused when compiled
+    if torch.compiler.is_compiling() or light.numel() > FEW:
+        return _dots(dot_of, components(normal), components(light), components(view), extremes)
+    return _dots(_sum_of_products, normal, light, view, extremes)
+
+
+_Vector = TypeVar("_Vector", Tensor, Components)
+
+
+def _dots(
+    product: Callable[[_Vector, _Vector], Tensor], n: _Vector, s: _Vector, v: _Vector, extremes: list[Tensor] | None
+) -> tuple[Tensor, ...]:
     if extremes is not None:
         with torch.no_grad():
-            squares = [dot_of(c, c) for c in (n, s, v)]
+            squares = [product(c, c) for c in (n, s, v)]
             extremes += [limit for squared in squares if squared.numel() for limit in torch.aminmax(squared)]
-    return dot_of(n, s), dot_of(n, v), dot_of(s, v)
+    return product(n, s), product(n, v), product(s, v)
+
+
+def _sum_of_products(a: Tensor, b: Tensor) -> Tensor:
+    return (a * b).sum(-1)
 
 
 def _refuse_other_than_unit(**vectors: Tensor) -> None:

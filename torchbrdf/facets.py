@@ -83,13 +83,7 @@ class HalfVector:
     def of(cls, cosines: Cosines) -> "HalfVector":
         up = cosines.light + cosines.view
         if cosines.tangent is not None:
-            plane = cosines.tangent_plane
-            along = plane.light_tangent + plane.view_tangent
-            across = plane.light_bitangent + plane.view_bitangent
-            flat = along * along + across * across
-            squared = flat + up * up
-            length = squared.sqrt()
-            return cls(up / length, flat / squared, length / 2, along / length, across / length)
+            return cls(*in_pieces(_along_tangent, *cosines.tangent_plane, up))
         if cosines.vectors is not None:
             (flat,) = in_pieces(_planar_squared, *cosines.vectors, own=1)
             flat = flat * cosines.lit
@@ -113,13 +107,24 @@ class HalfVector:
         return (self.tangent / alpha_x) ** 2 + (self.bitangent / alpha_y) ** 2
 
 
+def _along_tangent(
+    light_tangent: Tensor, light_bitangent: Tensor, view_tangent: Tensor, view_bitangent: Tensor, up: Tensor
+) -> tuple[Tensor, ...]:
+    """The half vector from a `TangentPlane` and the part of light + view along the normal, each (...)."""
+    along, across = light_tangent + view_tangent, light_bitangent + view_bitangent
+    flat = torch.addcmul(along * along, across, across)
+    squared = torch.addcmul(flat, up, up)
+    length = squared.sqrt()
+    return up / length, flat / squared, length / 2, along / length, across / length
+
+
 def _planar_squared(normal: Tensor, light: Tensor, view: Tensor) -> tuple[Tensor]:
     """Squared length of the part of light + view along the surface (...)."""
     n, s, v = components(normal), components(light), components(view)
     total = s[0] + v[0], s[1] + v[1], s[2] + v[2]
     along = dot_of(total, n)
-    planar = tuple(torch.addcmul(t, along, axis, value=-1) for t, axis in zip(total, n, strict=True))
-    return (dot_of(planar, planar),)
+    x, y, z = (torch.addcmul(t, along, axis, value=-1) for t, axis in zip(total, n, strict=True))
+    return (dot_of((x, y, z), (x, y, z)),)
 
 
 def v_cavity_masking(cosines: Cosines, half: HalfVector) -> Tensor:

@@ -49,6 +49,10 @@ from torchbrdf import (
 Call = Callable[[], Tensor]
 # What the code by hand does not compute, by model.
 BEYOND = {
+    "Hapke": "surge, phase function, two streams per channel",
+    "AshikhminShirley": "a tangent frame, two lobes",
+    "AnisotropicGGX": "a tangent frame",
+    "AnisotropicBeckmann": "a tangent frame",
     "FastGaussianHeightfield": "all bounces of a random heightfield",
     "FastRoughSurface": "all bounces, without the errors of the fit",
     "HeTorrance": "wave optics: a series per channel",
