@@ -224,7 +224,10 @@ class TestOfComponents:
         got, expected = brdf.evaluate(Cosines.of_components(*apart)), brdf(*whole)
         assert (expected > 0).sum() > 20
         eps = torch.finfo(dtype).eps
-        torch.testing.assert_close(got, expected, rtol=8 * eps, atol=0)
+        # strided memory is summed in another order: a rounding of each product, relative to the smallest
+        cosines = Cosines.of(*vectors)
+        smallest = float(torch.minimum(cosines.light, cosines.view).min())
+        torch.testing.assert_close(got, expected, rtol=4 * eps / smallest, atol=0)
         by_part = torch.autograd.grad(got.sum(), [part for v in apart for part in v])
         by_whole = torch.autograd.grad(expected.sum(), whole)
         for v, g in enumerate(by_whole):
