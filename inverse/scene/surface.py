@@ -9,13 +9,16 @@ pixel into s x s points, which the shading averages.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import torch
-from scipy.interpolate import CubicSpline
 from torch import Tensor
 from torch.nn.functional import normalize
 
 from inverse.shapes import Cuboid, Cylinder, Plane, Revolution, Solid, Sphere
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 TO_CAMERA = (0.0, 0.0, 1.0)
 # Heights and radii of the default vase: foot, waist, belly, shoulder, neck, lip.
@@ -105,8 +108,10 @@ def pixel_grid(height: int, width: int, *, samples: int = 1, dtype: torch.dtype 
     return x, y
 
 
-def vase_profile() -> CubicSpline:
+def vase_profile() -> "CubicSpline":
     """Radius of the default clay vase as a smooth function of height, defined on [-0.92, 0.92]."""
+    from scipy.interpolate import CubicSpline  # deferred: half a second
+
     return CubicSpline(_VASE_HEIGHTS, _VASE_RADII, extrapolate=False)
 
 

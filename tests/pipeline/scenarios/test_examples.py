@@ -53,6 +53,15 @@ def test_first_steps(run):
         assert numbers(line)[0] == pytest.approx(40, abs=0.02)
 
 
+@pytest.mark.parametrize("backend", ["aot_eager", pytest.param("inductor", marks=pytest.mark.slow)])
+def test_compiled_fit_finds_most_pixels(run, backend):
+    torch.compiler.reset()
+    printed = run("06_compiled_fit.py", "--pixels", 500, "--steps", 200, "--backend", backend).splitlines()
+    sigma, albedo = numbers(printed[-1])
+    assert sigma < 0.02
+    assert albedo < 0.01
+
+
 def test_vase_fit_recovers_the_clay_and_lambert_fails_as_the_paper_says(run, tmp_path):
     printed = run("01_fit_vase.py", "--size", 96, "--output", tmp_path).splitlines()
     exact = next(x for x in printed if x.startswith("exact, K = 16, all"))
