@@ -10,8 +10,10 @@ from inverse.transport.radiometry import (
 )
 from inverse.transport.radiosity import why_no_interreflection
 from inverse.transport.rendering import images_of, radiance_of, render
+from inverse.transport.shadows import Shadows
 
 __all__ = [
+    "Shadows",
     "exitance",
     "images_of",
     "irradiance",
