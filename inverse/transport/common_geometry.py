@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import torch
 from torch import Tensor
@@ -12,6 +13,8 @@ from inverse.transport.direct import unhidden
 from inverse.transport.shadows import Shadows
 from torchbrdf import Cosines
 
+# Pairs of a point and a direction of light that are shaded at once, if that takes several directions.
+_TOGETHER = 1 << 13
 # A vector of unit length within so many roundings is not scaled again.
 _UNIT_ROUNDING = 8
 
@@ -36,8 +39,19 @@ class CommonGeometry:
         """The directions from which a light reaches the points, with no irradiance where it is hidden."""
         return unhidden(light, self._shadows)
 
+    def batches(self, light: Light) -> Iterator[Arrival]:
+        """The same, several at a time where the points are few: direction (batch, 1 or point, 3), irradiance (batch, 1
+        or point, 1 or channel)."""
+        size = max(1, _TOGETHER // len(self.normals))
+        arrivals = self.arrivals(light)
+        while batch := list(islice(arrivals, size)):
+            directions, irradiances = zip(*batch, strict=True)
+            rows = torch.broadcast_tensors(*(torch.atleast_2d(direction) for direction in directions))
+            yield Arrival(torch.stack(rows), torch.stack(torch.broadcast_tensors(*irradiances)))
+
     def cosines(self, direction: Tensor) -> Cosines:
-        """Cosines (point,) of light from a direction, (3,) or (point, 3), of any length but 0, in the points' dtype."""
+        """Cosines (..., point) of light from directions (..., 3), of any length but 0, in the points' dtype; leading
+        shapes broadcast with the points'."""
         if direction.dtype != self.normals.dtype or not _are_unit(direction):
             _, direction, _ = _scaled(self.normals, direction, self.view)
         products = dots(self.normals, direction), self.cos_view, dots(direction, self.view)

@@ -111,10 +111,10 @@ def _exchanged(model: BRDF, bounces: Sequence[Tensor]) -> Tensor:
 
 
 def _lit(geometry: CommonGeometry, arrival: Arrival) -> tuple[Cosines, Tensor]:
-    """Cosines (point,), and cos(light) irradiance (point, 1 or channel): the only place where a camera's image takes
+    """Cosines (..., point), and cos(light) irradiance (..., point, 1 or channel): the only place where a camera's image takes
     the light's cosine."""
     cosines = geometry.cosines(arrival.direction)
-    return cosines, cosines.light[:, None] * arrival.irradiance
+    return cosines, cosines.light[..., None] * arrival.irradiance
 
 
 def reflected(footprints: Footprints, geometry: CommonGeometry, light: Light) -> Callable[[BRDF], Tensor]:
@@ -135,9 +135,9 @@ def reflected(footprints: Footprints, geometry: CommonGeometry, light: Light) ->
         for cosines, strength in kept:
             total = total + model.evaluate(cosines) * strength
         if light.extended:
-            for arrival in geometry.arrivals(light):
-                cosines, strength = _lit(geometry, arrival)
-                total = total + model.evaluate(cosines) * strength
+            for arrivals in geometry.batches(light):
+                cosines, strength = _lit(geometry, arrivals)
+                total = total + (model.evaluate(cosines) * strength).sum(0)
             total = total + _mirrored(model, geometry, light)
         return total
 

@@ -86,12 +86,12 @@ def test_unknown_parts_of_a_depth_map_hide_nothing():
 @pytest.mark.parametrize("size", [(70, 150), (9, 90)])
 @pytest.mark.parametrize("distance", [math.inf, 30.0])
 def test_shadows_are_those_of_rays_that_try_every_pixel(size, distance):
-    for seed in range(4):
+    for seed in range(2):
         g = torch.Generator().manual_seed(seed)
         heights = torch.randn(size, dtype=D, generator=g).cumsum(1)
         if seed % 2:
             heights[torch.rand(size, generator=g) < 0.05] = torch.nan
-        at = torch.rand(400, 3, dtype=D, generator=g) * torch.tensor([size[1] - 1.0, 1.0 - size[0], 0], dtype=D)
+        at = torch.rand(200, 3, dtype=D, generator=g) * torch.tensor([size[1] - 1.0, 1.0 - size[0], 0], dtype=D)
         origin = (
             at + torch.tensor([0.0, 0, 1], dtype=D) * heights[-at[:, 1].round().long(), at[:, 0].round().long(), None]
         )

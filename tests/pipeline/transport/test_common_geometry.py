@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from inverse import Distant, Point, perspective, sphere
+from inverse import Distant, Environment, Point, perspective, sphere
 from inverse.scene import Footprints
 from inverse.scene.cameras import pinhole
 from inverse.shapes import Sphere
@@ -28,6 +28,18 @@ def test_cosines_are_those_of_the_vectors(footprints, light):
     expected = Cosines.of(footprints.normals, arrival.direction, footprints.view)
     for name in NAMES:
         assert_close(getattr(cosines, name), getattr(expected, name), rtol=0, atol=1e-15)
+
+
+def test_batches_are_the_arrivals_stacked():
+    geometry = CommonGeometry(NEAR)
+    sky = Environment(torch.rand(8, 16, 3, dtype=D, generator=torch.Generator().manual_seed(0)))
+    for light in (sky, LAMP):
+        arrivals, batches = list(geometry.arrivals(light)), list(geometry.batches(light))
+        assert len(batches) < len(arrivals) or len(arrivals) == 1
+        irradiances = torch.cat([batch.irradiance for batch in batches])
+        assert torch.equal(irradiances, torch.stack([arrival.irradiance for arrival in arrivals]))
+        cosines = torch.cat([geometry.cosines(batch.direction).light for batch in batches])
+        assert torch.equal(cosines, torch.stack([geometry.cosines(arrival.direction).light for arrival in arrivals]))
 
 
 def test_vectors_of_other_lengths_are_scaled():
