@@ -25,6 +25,8 @@ _LONGEST_STEP = 2.0
 _FARTHEST = {torch.float64: 30.0, torch.float32: 14.0}
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-12, 1e12
 _PROGRESS_AFTER_SECONDS = 2.0
+# Unknowns in whose directions the residuals are differentiated at once.
+_TOGETHER = 8
 
 Residual = Callable[[Tensor, Tensor], Tensor]
 
@@ -46,19 +48,8 @@ class NormalEquations:
     @classmethod
     def of(cls, residual: Residual, shared: Tensor, own: Tensor) -> "NormalEquations":
         """Linearise the residuals at (shared (G,), own (N, L))."""
-        r = residual(shared, own).double()
-        columns = []
-        for k in range(len(shared)):
-            tangent = torch.zeros_like(shared)
-            tangent[k] = 1
-            columns.append(_derivative(residual, shared, own, tangent, torch.zeros_like(own)))
-        by_shared = torch.stack(columns) if columns else r.new_zeros(0, *r.shape)
-        columns = []
-        for k in range(own.shape[1]):  # one sweep moves this unknown of every pixel at once
-            tangent = torch.zeros_like(own)
-            tangent[:, k] = 1
-            columns.append(_derivative(residual, shared, own, torch.zeros_like(shared), tangent))
-        by_own = torch.stack(columns) if columns else r.new_zeros(0, *r.shape)
+        r, derivatives = _linearised(residual, shared, own)
+        by_shared, by_own = derivatives.split([len(shared), own.shape[1]])
         return cls(
             torch.einsum("ginc,hinc->gh", by_shared, by_shared),
             torch.einsum("ginc,linc->ngl", by_shared, by_own),
@@ -191,8 +182,20 @@ def _boxed_solution(matrix: Tensor, right: Tensor, limit: Tensor) -> Tensor:
     return solution
 
 
-def _derivative(residual: Residual, shared: Tensor, own: Tensor, d_shared: Tensor, d_own: Tensor) -> Tensor:
-    return torch.func.jvp(residual, (shared, own), (d_shared, d_own))[1].double()
+def _linearised(residual: Residual, shared: Tensor, own: Tensor) -> tuple[Tensor, Tensor]:
+    """The residuals r (...), and their derivatives (unknown, ...) by the shared unknowns and then by those of every
+    pixel at once, in float64."""
+    count, pixels = len(shared), own.shape[1]
+
+    def along(d_shared: Tensor, d_own: Tensor) -> tuple[Tensor, Tensor]:
+        value, slope = torch.func.jvp(residual, (shared, own), (d_shared, d_own.expand(own.shape)))[:2]
+        return value, slope
+
+    tangents = torch.eye(count + pixels, dtype=shared.dtype, device=shared.device).split([count, pixels], 1)
+    # what does not move with an unknown, the residuals among it, is computed once for several
+    several = torch.vmap(along, out_dims=(None, 0))  # pyright: ignore[reportArgumentType]
+    parts = [several(*k) for k in zip(*(t.split(_TOGETHER) for t in tangents), strict=True)]
+    return parts[0][0].double(), torch.cat([slopes.double() for _, slopes in parts])
 
 
 def scale(matrix: Tensor) -> Tensor:

@@ -111,8 +111,10 @@ def _exchanged(model: BRDF, bounces: Sequence[Tensor]) -> Tensor:
 
 
 def _lit(geometry: CommonGeometry, arrival: Arrival) -> tuple[Cosines, Tensor]:
-    """Cosines (..., point), and cos(light) irradiance (..., point, 1 or channel): the only place where a camera's image takes
-    the light's cosine."""
+    """Cosines (..., point), and cos(light) irradiance (..., point, 1 or channel).
+
+    The only place where a camera's image takes the light's cosine.
+    """
     cosines = geometry.cosines(arrival.direction)
     return cosines, cosines.light[..., None] * arrival.irradiance
 
