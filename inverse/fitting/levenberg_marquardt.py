@@ -28,7 +28,36 @@ _PROGRESS_AFTER_SECONDS = 2.0
 # Unknowns in whose directions the residuals are differentiated at once.
 _TOGETHER = 8
 
-Residual = Callable[[Tensor, Tensor], Tensor]
+
+class Residuals:
+    """What is to be minimised: a function of (shared (G,), own (N, L)) with values (image, pixel, channel).
+
+    One whose derivatives can be had for less than a forward pass each overrides them.
+    """
+
+    def __init__(self, values: Callable[[Tensor, Tensor], Tensor]):
+        self._values = values
+
+    def __call__(self, shared: Tensor, own: Tensor) -> Tensor:
+        return self._values(shared, own)
+
+    def by_shared(self, shared: Tensor, own: Tensor) -> Tensor:
+        """Derivatives (G, image, pixel, channel)."""
+        still = own.new_zeros(len(shared), 1, own.shape[1])
+        return self._along(shared, own, torch.eye(len(shared)).to(shared), still)
+
+    def by_own(self, shared: Tensor, own: Tensor) -> Tensor:
+        """Derivatives (L, image, pixel, channel), each by the unknown of the pixel itself."""
+        entries = own.shape[1]  # each sweep moves this unknown of every pixel at once
+        return self._along(shared, own, shared.new_zeros(entries, len(shared)), torch.eye(entries).to(own)[:, None])
+
+    def _along(self, shared: Tensor, own: Tensor, d_shared: Tensor, d_own: Tensor) -> Tensor:
+        """Along several directions (unknown, G) and (unknown, 1, L): what does not move is computed once for all."""
+
+        def slope(d_shared: Tensor, d_own: Tensor) -> Tensor:
+            return torch.func.jvp(self, (shared, own), (d_shared, d_own.expand(own.shape)))[1]
+
+        return torch.vmap(slope, chunk_size=_TOGETHER)(d_shared, d_own)
 
 
 @dataclass(frozen=True)
@@ -46,10 +75,11 @@ class NormalEquations:
     cost: float
 
     @classmethod
-    def of(cls, residual: Residual, shared: Tensor, own: Tensor) -> "NormalEquations":
+    def of(cls, residuals: Residuals, shared: Tensor, own: Tensor) -> "NormalEquations":
         """Linearise the residuals at (shared (G,), own (N, L))."""
-        r, derivatives = _linearised(residual, shared, own)
-        by_shared, by_own = derivatives.split([len(shared), own.shape[1]])
+        r = residuals(shared, own).double()
+        by_shared = residuals.by_shared(shared, own).double() if len(shared) else r.new_zeros(0, *r.shape)
+        by_own = residuals.by_own(shared, own).double() if own.shape[1] else r.new_zeros(0, *r.shape)
         return cls(
             torch.einsum("ginc,hinc->gh", by_shared, by_shared),
             torch.einsum("ginc,linc->ngl", by_shared, by_own),
@@ -114,10 +144,10 @@ class Solution:
     history: list[float] = field(default_factory=list)
 
 
-def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int) -> Solution:
-    """Minimise the sum of squares of `residual(shared (G,), own (N, L)) -> (image, pixel, channel)`."""
+def minimise(residuals: Residuals, shared: Tensor, own: Tensor, *, max_steps: int) -> Solution:
+    """Minimise the sum of squares of residuals of (shared (G,), own (N, L))."""
     dtype = shared.dtype
-    equations = NormalEquations.of(residual, shared, own)
+    equations = NormalEquations.of(residuals, shared, own)
     reached = Solution(shared, own, "out of steps", f"not converged after {max_steps} steps", 0, equations)
     reached.history.append(equations.cost)
     if not torch.isfinite(torch.tensor(equations.cost)):
@@ -134,7 +164,7 @@ def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int)
             moved = ((new_shared - reached.shared).double(), (new_own - reached.own).double())
             decrease = reached.equations.predicted_decrease(*moved)
             length = max((d.abs().max().item() for d in moved if d.numel()), default=0.0)
-            cost = residual(new_shared, new_own).double().square().sum().item()
+            cost = residuals(new_shared, new_own).double().square().sum().item()
             small = 0 <= decrease <= COST_TOLERANCE[dtype] * reached.equations.cost
             negligible = small or length < STEP_TOLERANCE[dtype]
             if cost <= reached.equations.cost or negligible or damping > _MOST_DAMPING:
@@ -142,7 +172,7 @@ def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int)
             damping *= 4
         if cost <= reached.equations.cost:  # false for NaN
             reached.shared, reached.own = new_shared, new_own
-            reached.equations = NormalEquations.of(residual, new_shared, new_own)
+            reached.equations = NormalEquations.of(residuals, new_shared, new_own)
             damping = max(damping / 10, _LEAST_DAMPING)
         reached.history.append(reached.equations.cost)
         if negligible:
@@ -180,22 +210,6 @@ def _boxed_solution(matrix: Tensor, right: Tensor, limit: Tensor) -> Tensor:
         solution[worst] = solution[worst].sign() * limit[worst]
         free[worst] = False
     return solution
-
-
-def _linearised(residual: Residual, shared: Tensor, own: Tensor) -> tuple[Tensor, Tensor]:
-    """The residuals r (...), and their derivatives (unknown, ...) by the shared unknowns and then by those of every
-    pixel at once, in float64."""
-    count, pixels = len(shared), own.shape[1]
-
-    def along(d_shared: Tensor, d_own: Tensor) -> tuple[Tensor, Tensor]:
-        value, slope = torch.func.jvp(residual, (shared, own), (d_shared, d_own.expand(own.shape)))[:2]
-        return value, slope
-
-    tangents = torch.eye(count + pixels, dtype=shared.dtype, device=shared.device).split([count, pixels], 1)
-    # what does not move with an unknown, the residuals among it, is computed once for several
-    several = torch.vmap(along, out_dims=(None, 0))  # pyright: ignore[reportArgumentType]
-    parts = [several(*k) for k in zip(*(t.split(_TOGETHER) for t in tangents), strict=True)]
-    return parts[0][0].double(), torch.cat([slopes.double() for _, slopes in parts])
 
 
 def scale(matrix: Tensor) -> Tensor:

@@ -9,10 +9,11 @@ from inverse.transport.radiometry import (
     solid_angle_of_patch,
 )
 from inverse.transport.radiosity import why_no_interreflection
-from inverse.transport.rendering import images_of, radiance_of, render
+from inverse.transport.rendering import Contraction, images_of, radiance_of, render
 from inverse.transport.shadows import Shadows
 
 __all__ = [
+    "Contraction",
     "Shadows",
     "exitance",
     "images_of",
