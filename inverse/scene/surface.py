@@ -9,6 +9,7 @@ pixel into s x s points, which the shading averages.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import torch
@@ -117,9 +118,14 @@ def vase_profile() -> "CubicSpline":
 
 def vase(height: int = 512, width: int = 512, *, samples: int = 1, dtype: torch.dtype = torch.float32) -> Surface:
     """The default vase seen from the front."""
+    return _front_of(_vase_solid(), height, width, samples, dtype)
+
+
+@lru_cache(maxsize=1)
+def _vase_solid() -> Revolution:
+    """One for all images: what is remembered of a solid, such as the light between its parts, is found again."""
     profile = vase_profile()
-    solid = Revolution(profile, profile.derivative(), _VASE_HEIGHTS[0], _VASE_HEIGHTS[-1])
-    return _front_of(solid, height, width, samples, dtype)
+    return Revolution(profile, profile.derivative(), _VASE_HEIGHTS[0], _VASE_HEIGHTS[-1])
 
 
 def revolution(

@@ -117,6 +117,18 @@ def test_models_are_timed_against_the_code_by_hand(run):
     assert {"OrenNayar", "EON", "FastGaussianHeightfield"} <= rows.keys()
 
 
+def test_pictures_and_their_shadows_are_timed(run):
+    printed = run("benchmarks/pictures.py", "--size", 24, "--repeats", 1)
+    rows = [line.strip("| ").split(" | ") for line in printed.splitlines() if line[-3:-2].isdigit()]
+    assert [row[0] for row in rows] == [
+        "vase",
+        "two spheres on a plane",
+        "vase's depth map",
+        *["vase", "vase", "sphere", "sphere"],
+    ]
+    assert all(float(number) > 0 for row in rows for number in row[1:])
+
+
 def test_the_code_by_hand_is_the_functional_model(load):
     """Away from the normal, where it has its faults."""
     by_hand = load("benchmarks/naive.py")["naive_oren_nayar"]
