@@ -5,10 +5,9 @@ import math
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import safe_sqrt
-from torchbrdf.directions import Cosines
-from torchbrdf._numerics import holds
+from torchbrdf._numerics import holds, safe_sqrt
 from torchbrdf.checks import taken_on_trust
+from torchbrdf.directions import Cosines
 from torchbrdf.fresnel import RELATIVE_INDEX, conductor
 from torchbrdf.models.he_torrance.perfect_reflector import (
     Geometry,
@@ -40,7 +39,7 @@ def check_surface(name: str, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor,
 
 
 def check_ratio(name: str, *, wavelength: Tensor, **lengths: Tensor) -> None:
-    """Raise ValueError for a surface so much larger than the wavelength that no number holds it. Not inside `unchecked()`."""
+    """Raise ValueError for a surface that is too large, in wavelengths, for float32. Not inside `unchecked()`."""
     if taken_on_trust() or not wavelength.numel():
         return
     shortest = wavelength.detach().min()
