@@ -14,7 +14,7 @@ from torchbrdf.models.oren_nayar.azimuth_paper import direct_mean_paper, two_bou
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, modes_of
 from torchbrdf.models.oren_nayar.fast import FastRoughSurface
 from torchbrdf.models.oren_nayar.functional import OrenNayar
-from torchbrdf.models.oren_nayar.images import Bounces, flat_coefficients, mean_images
+from torchbrdf.models.oren_nayar.images import Bounces, Images, direct_images, exchange_images, flat_coefficients
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane, slope_plane
 from torchbrdf.models.rungs import Member, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, Simplex, fixed, kept
@@ -53,6 +53,14 @@ class SharedSlopes(CltcSampled, ImageBRDF):
     def slope_weights(self) -> Tensor:
         """Shares of the slopes in the horizontal area, (nodes,) or (..., nodes); they sum to 1. [-]"""
 
+    def direct_slopes(self) -> tuple[float, ...]:
+        """Slope angles of direct light: those of the interreflection unless the subclass says otherwise. [rad]"""
+        return shared_slopes(self.nodes)
+
+    def direct_weights(self) -> Tensor:
+        """Shares of `direct_slopes`, which sum to 1. [-]"""
+        return self.slope_weights()
+
     @property
     @abstractmethod
     def _rho(self) -> Tensor:
@@ -63,28 +71,41 @@ class SharedSlopes(CltcSampled, ImageBRDF):
 
     def images(self, *coordinates: Tensor) -> Tensor:
         plane = SlopePlane(*coordinates)
-        slopes = plane.dot.new_tensor(shared_slopes(self.nodes), dtype=torch.float64)
-        images = mean_images(
+        direct = direct_images(plane, **_sides(self.direct_slopes(), plane.dot))
+        if not self._bounces.two:
+            return direct
+        exchanged = exchange_images(
             plane,
-            cos_slope=slopes.cos().to(plane.dot.dtype),
-            tan_slope=slopes.tan().to(plane.dot.dtype),
+            **_sides(shared_slopes(self.nodes), plane.dot),
             bounces=self._bounces,
             order=self.order,
             graded=self.graded,
             modes=self._modes(plane.dot),
         )
-        return images.flat()
+        return Images(direct, *exchanged).flat()
 
     def component_coefficients(self) -> dict[str, Tensor]:
         weights = self.slope_weights()
         modes = self._modes(weights)
         eigenvalues = None if modes is None else modes.eigenvalues
-        return flat_coefficients(weights, self._rho, bounces=self._bounces, eigenvalues=eigenvalues)
+        return flat_coefficients(
+            weights,
+            self._rho,
+            bounces=self._bounces,
+            eigenvalues=eigenvalues,
+            direct_weights=self.direct_weights(),
+        )
 
     def _modes(self, like: Tensor) -> CavityModes | None:
         if not self._bounces.modes:
             return None
         return modes_of(shared_slopes(self.nodes), self._bounces.modes, like.dtype, like.device)
+
+
+def _sides(slopes: tuple[float, ...], like: Tensor) -> dict[str, Tensor]:
+    """Cosine and tangent of slope angles, each (K,), rounded once. [-]"""
+    angle = like.new_tensor(slopes, dtype=torch.float64)
+    return {"cos_slope": angle.cos().to(like.dtype), "tan_slope": angle.tan().to(like.dtype)}
 
 
 @final
@@ -131,7 +152,7 @@ class RoughSurface(SharedSlopes):
         albedo: ParameterValue = 0.5,
         sigma: ParameterValue = 0.3,
         nodes: int = 16,
-        order: int = 4,
+        order: int = 3,
         graded: bool = False,
         bounces: BounceCount = 2,
         modes: int = 4,
@@ -146,6 +167,12 @@ class RoughSurface(SharedSlopes):
 
     def slope_weights(self) -> Tensor:
         return gaussian_weights(self.sigma, nodes=self.nodes)
+
+    def direct_slopes(self) -> tuple[float, ...]:
+        return shared_slopes(2 * self.nodes - 1)
+
+    def direct_weights(self) -> Tensor:
+        return gaussian_weights(self.sigma, nodes=2 * self.nodes - 1)
 
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
@@ -196,7 +223,7 @@ class TabulatedRoughSurface(SharedSlopes):
         *,
         albedo: ParameterValue = 0.5,
         weights: Tensor | fixed,
-        order: int = 4,
+        order: int = 3,
         graded: bool = False,
         bounces: BounceCount = 2,
         modes: int = 4,
@@ -254,8 +281,7 @@ class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
 
     def images(self, *coordinates: Tensor) -> Tensor:
         plane = SlopePlane(*(field[..., None] for field in coordinates))
-        slopes = plane.dot.new_tensor(shared_slopes(self.nodes), dtype=torch.float64)
-        slope = {"cos_slope": slopes.cos().to(plane.dot.dtype), "tan_slope": slopes.tan().to(plane.dot.dtype)}
+        slope = _sides(shared_slopes(self.nodes), plane.dot)
         return torch.cat((direct_mean_paper(plane, **slope), two_bounce_mean_paper(plane, **slope)), -1)
 
     def component_coefficients(self) -> dict[str, Tensor]:
