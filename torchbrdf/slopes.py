@@ -33,7 +33,7 @@ _MOMENT_WIDTH = 9.0  # exp(-81/2) is below the rounding of float64
 # Angles below this are equidistant, those above geometric: [rad] a node, so that many nodes, which are close anyway,
 # do not crowd where nothing happens before 89.95 degrees.
 _KNEE_A_NODE = 8e-5
-_LARGEST_STEP = 0.6  # of asinh(angle / knee) near the flat facet; a Gaussian sampled that far apart loses 1e-3
+_LARGEST_STEP = 0.62  # of asinh(angle / knee) near the flat facet; a Gaussian sampled that far apart loses 1e-3
 
 
 class _Slopes(NamedTuple):

@@ -87,7 +87,7 @@ OREN_NAYAR = [
     ),
     Model(
         "rough surface",
-        lambda dtype: RoughSurface(albedo=colour(dtype), sigma=number(0.5, dtype), nodes=5, order=3),
+        lambda dtype: RoughSurface(albedo=colour(dtype), sigma=number(0.5, dtype), nodes=4, order=3),
         captured=False,
         integral=KINKED,
         float32=STEEP,
@@ -95,7 +95,7 @@ OREN_NAYAR = [
     Model(
         "rough surface, white, all bounces",
         lambda dtype: RoughSurface(
-            albedo=fixed(number(1.0, dtype)), sigma=number(0.9, dtype), nodes=3, order=6, graded=True, bounces="all"
+            albedo=fixed(number(1.0, dtype)), sigma=number(0.5, dtype), nodes=3, order=6, graded=True, bounces="all"
         ),
         captured=False,
         integral=KINKED,

@@ -54,8 +54,8 @@ def one_cut(plane: SlopePlane, lobes: Lobes, order: int, *, graded: bool = False
     A direction that is nowhere cut is free everywhere and enters linearly: its mean over both halves of the lobe is
     p.q/|p|^2 times the other projection, which is smooth where that direction is the normal and has no azimuth.
     """
-    folded = torch.minimum(plane.delta, math.pi - plane.delta)
-    sign = torch.where(plane.delta <= 0.5 * math.pi, 1.0, -1.0)
+    near = plane.delta <= 0.5 * math.pi
+    folded, sign = torch.where(near, plane.delta, math.pi - plane.delta), torch.where(near, 1.0, -1.0)
     rims, starts, ends, offsets, cuts, frees, slants, doubled = [], [], [], [], [], [], [], []
     for half, rim, cut, tangent, zone, free in (
         (lobes.half_light, lobes.clear_light, lobes.light, plane.tan_light, lobes.clear_view, lobes.view),
@@ -100,14 +100,18 @@ def _piece(start: Tensor, end: Tensor, order: int) -> tuple[Tensor, Tensor]:
 
 
 def _graded_piece(start: Tensor, end: Tensor, offset: Tensor, rim: Tensor, order: int) -> tuple[Tensor, Tensor]:
-    """As `_piece`, dense towards the rims: in w = log tan(u/2), u = delta + offset, the projection is A/cosh(w), and
-    the square roots of the integrand vanish no nearer than |Im w| = pi/2, at any angle.
+    """As `_piece`, dense towards both rims: `order` nodes on either side of the middle (..., 2 order, pixel).
+
+    In w = log tan(u/2), u = delta + offset, the projection is A/cosh(w), and the square roots of the integrand vanish
+    no nearer than |Im w| = pi/2, at any angle.
     """
     x, weight = (_column(t) for t in gauss_legendre(order, start))
     # u is no less than the rim: rounding would take it to 0 on a slope of 90 degrees
     low, high = ((0.5 * torch.maximum(edge + offset, rim)).tan().log() for edge in (start, end))
-    w = low + (high - low) * x
-    return 2 * w.exp().atan() - offset, (high - low) * weight / w.cosh()
+    middle = torch.minimum(torch.maximum(torch.zeros_like(low), low), high)
+    w = torch.cat((low + (middle - low) * x, middle + (high - middle) * x), -2)
+    share = torch.cat(((middle - low) * weight, (high - middle) * weight), -2)
+    return 2 * w.exp().atan() - offset, share / w.cosh()
 
 
 def both_cut(lobes: Lobes, angle: Tensor, order: int, *, crossing: Tensor | None = None) -> BothCut:
@@ -173,7 +177,13 @@ def _root_scale(plane: SlopePlane, lobes: Lobes) -> Tensor:
 
 
 def two_bounce_mean(
-    plane: SlopePlane, lobes: Lobes, correlation: Tensor, *, order: int, graded: bool = False
+    plane: SlopePlane,
+    lobes: Lobes,
+    correlation: Tensor,
+    *,
+    order: int,
+    graded: bool = False,
+    one: OneCut | None = None,
 ) -> Tensor:
     r"""Azimuth mean of the exact two-bounce BRDF of one slope angle, unit albedo.
 
@@ -186,11 +196,13 @@ def two_bounce_mean(
         correlation: CC (..., pixel) of the same lobes. [-]
         order: nodes on each piece where one direction is cut, twice as many where both are; 3 serves pictures.
         graded: for the reference: nodes graded to where the integrand turns; 16 nodes then serve 1e-9.
+        one: `one_cut` of the same arguments, where two bounces and more share it.
     Returns: (..., pixel). [1/sr]
     """
     c = lobes.cos_slope
     wide = c[..., None, :]
-    one = one_cut(plane, lobes, order, graded=graded)
+    if one is None:
+        one = one_cut(plane, lobes, order, graded=graded)
     single = (one.weight * (1 - one.free) * one_cut_share(one.cut, wide)).sum(-2)
     both = _facing(plane, lobes, order, graded)
     paired = (both.weight * _both_cut_share(both.light, both.view, wide)).sum(-2)
@@ -218,7 +230,14 @@ def _both_cut_share(z: Tensor, b: Tensor, cos_slope: Tensor) -> Tensor:
 
 
 def higher_bounce_means(
-    plane: SlopePlane, lobes: Lobes, correlation: Tensor, modes: CavityModes, *, order: int, graded: bool = False
+    plane: SlopePlane,
+    lobes: Lobes,
+    correlation: Tensor,
+    modes: CavityModes,
+    *,
+    order: int,
+    graded: bool = False,
+    one: OneCut | None = None,
 ) -> Tensor:
     r"""Geometry side of three and more bounces: azimuth means over the modes of each slope, (1/pi) C times mean of xi_n
     xi_n.
@@ -227,12 +246,13 @@ def higher_bounce_means(
     the mean is G_n(1)^2 times the closed form of `saturated_correlation`, and the pieces of two bounces serve the rest.
 
     Args: plane, lobes, correlation (..., K, pixel), modes of the same K slopes; `order` nodes on each piece, `graded`
-        as in `two_bounce_mean`.
+        and `one` as in `two_bounce_mean`.
     Returns: (..., K, N, 2, pixel), last but one axis (same facet lit, opposite facet lit); contract with
         `cavity_modes.bounce_coefficients`. [1/sr]
     """
     whole = strip_means(modes, torch.ones_like(modes.cos_slope)[:, None])  # G_n(1), (K, N, 1)
-    one = one_cut(plane, lobes, order, graded=graded)
+    if one is None:
+        one = one_cut(plane, lobes, order, graded=graded)
     change = one.weight[..., None, :, :] * (_couplings(modes, one.cut) - whole[..., None])
     even, odd = change.sum(-2), (one.free[..., None, :, :] * change).sum(-2)
     means = []

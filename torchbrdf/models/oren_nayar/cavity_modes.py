@@ -71,10 +71,10 @@ def modes_of(slopes: tuple[float, ...], count: int, dtype: torch.dtype, device: 
 
 def strip_means(modes: CavityModes, strip: Tensor) -> Tensor:
     """G_n(s) for strip widths s (..., K, node) in [0, 1]; result (..., K, N, node). [-]"""
-    x = 2 * strip - 1
-    terms = [torch.ones_like(x), x]
+    twice = 4 * strip - 2
+    terms = [torch.ones_like(strip), 0.5 * twice]
     while len(terms) < modes.strip_means.shape[-1] - 2:
-        terms.append((2 * x) * terms[-1] - terms[-2])
+        terms.append(twice * terms[-1] - terms[-2])
     hidden = positive(1 - strip)
     valley = hidden * hidden * hidden.log()
     ridge = 4 * (modes.cos_slope * modes.cos_slope)[:, None]  # squared distance of the two ridges

@@ -16,7 +16,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf.models.oren_nayar.azimuth import direct_mean, saturated_correlation, saturated_lobes
-from torchbrdf.models.oren_nayar.azimuth_quadrature import higher_bounce_means, two_bounce_mean
+from torchbrdf.models.oren_nayar.azimuth_quadrature import higher_bounce_means, one_cut, two_bounce_mean
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, bounce_coefficients, facet_modes
 from torchbrdf.models.oren_nayar.interreflection import two_bounce_facet
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane
@@ -112,10 +112,11 @@ def exchange_images(
     lobes = saturated_lobes(wide, cos_slope=_slopes_first(cos_slope, shape), tan_slope=_slopes_first(tan_slope, shape))
     correlation = saturated_correlation(wide, lobes)
     two, higher = correlation[:0], correlation.new_zeros((0, 0, 2, correlation.shape[-1]))
+    nodes = {"order": order, "graded": graded, "one": one_cut(wide, lobes, order, graded=graded)}
     if bounces.two:
-        two = two_bounce_mean(wide, lobes, correlation, order=order, graded=graded)
+        two = two_bounce_mean(wide, lobes, correlation, **nodes)
     if modes is not None:
-        higher = higher_bounce_means(wide, lobes, correlation, modes, order=order, graded=graded)
+        higher = higher_bounce_means(wide, lobes, correlation, modes, **nodes)
     return _slopes_last(two, shape), _slopes_last(higher, shape)
 
 

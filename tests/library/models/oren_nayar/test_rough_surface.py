@@ -43,6 +43,7 @@ GRAZING = [
     (89.99, 77.19, 179.6, 0.7),
     (89.9, 89.9, 180.0, 0.002),
     (89.9, 60.0, 90.0, 0.05),
+    (89.9, 89.9, 180.0, 0.001),
 ]
 
 
@@ -107,3 +108,19 @@ def test_isotropic_white_surface_reflects_everything(sigma, degrees, tolerance):
     model = RoughSurface(albedo=one, sigma=rough, nodes=12, order=8, graded=True, bounces="all", modes=12)
     reflected = laws.albedo_by_quadrature(model, math.radians(degrees), 48)
     assert abs(reflected.item() - 1) < tolerance
+
+
+@pytest.mark.parametrize("sigma", [0.01, 0.5])
+def test_float32_at_grazing_angles(sigma):
+    generator = torch.Generator().manual_seed(11)
+    theta = math.radians(89.9) * torch.rand(2, 2000, generator=generator, dtype=DOUBLE) ** 0.2
+    azimuth = math.pi * torch.rand(2000, generator=generator, dtype=DOUBLE)
+    azimuth[::2] = math.pi
+    zero = torch.zeros_like(azimuth)
+    light = torch.stack((theta[0].sin(), zero, theta[0].cos()), -1).float()
+    view = torch.stack((theta[1].sin() * azimuth.cos(), theta[1].sin() * azimuth.sin(), theta[1].cos()), -1).float()
+    model = RoughSurface(albedo=0.9, sigma=sigma, bounces="all")
+    value = model(UP.float(), light, view, normalize=True)
+    exact = model.double()(UP, light.double(), view.double(), normalize=True)
+    assert (value >= 0).all()
+    torch.testing.assert_close(value.double(), exact, rtol=1e-2, atol=0)
