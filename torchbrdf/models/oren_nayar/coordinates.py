@@ -1,0 +1,64 @@
+r"""Coordinates in which the V-cavity reflectance of every roughness is nearly one smooth function.
+
+A facet of slope tan(theta_a) is shaded where tan(theta_a) tan(theta) > 1, so a light and a view are points p, q at
+distances t = z tan(theta) in one plane for all roughnesses, z(sigma) being the slope of typical facets; sigma itself
+enters once more, through the facets' own tilt. Everything is even in sigma, symmetric in light and view, 0 for a smooth
+surface and bounded at the horizon, and made of the cosines by products, quotients and roots. The cone at light = view
+is one coordinate; all others are smooth.
+"""
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from torchbrdf._numerics import positive
+
+KAPPA = 1.5  # z = KAPPA sigma for small sigma
+LEVEL = 1.25  # [rad] where z levels off: slopes end at 90 degrees, so that a wider Gaussian changes little
+RETURN = 0.5  # of `Coordinates.growth`
+SCALES = (1.2, 3.0, 1.5, 1.5, 1.5, 2.0, 1.5)  # bring the coordinates to one size
+# The tip of the cone is round on this scale, so that every derivative exists there, at the normal and at sigma = 0.
+_TIP = 1e-10
+
+
+class Coordinates(NamedTuple):
+    """Of directions (...) on a surface of roughness sigma (...)."""
+
+    features: Tensor  # (7, ...)
+    growth: Tensor  # grows as the tangent where light and view approach the horizon together (...)
+    share: Tensor  # z^2/(1 + z^2) (...)
+
+
+def coordinates(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor, sigma: Tensor) -> Coordinates:
+    """From the fields of `Cosines` of these names and sigma [rad], all of one shape (...)."""
+    s2 = sigma * sigma
+    z2 = KAPPA**2 * s2 / (1 + s2 / LEVEL**2)
+    over_light, over_view = 1 / light, 1 / view
+    scale = z2 * over_light * over_view
+    dot, cross = scale * (phase - light * view), scale * azimuth_sine  # p.q and |p x q|
+    t2_i = z2 * ((1 - light) * (1 + light)) * (over_light * over_light)
+    t2_r = z2 * ((1 - view) * (1 + view)) * (over_view * over_view)
+    v_i, v_r = torch.rsqrt(1 + t2_i), torch.rsqrt(1 + t2_r)
+    dip_i, dip_r = 1 - v_i, 1 - v_r
+    around = 1 + t2_i + t2_r
+    # Facets that one direction shades: vectors of length f = t^4/(1 + t^2)^(3/2) along p and q, and their distance.
+    # 2 f_i f_r (1 - cos(dphi)) is written with (|p||q| - p.q)^2 + |p x q|^2, which keeps its digits at dphi = 0.
+    g_i, g_r = t2_i * (v_i * v_i * v_i), t2_r * (v_r * v_r * v_r)
+    f_i, f_r = t2_i * g_i, t2_r * g_r
+    difference, both = f_i - f_r, f_i + f_r
+    turned = positive(t2_i * t2_r).sqrt() - dot
+    squared = difference * difference + g_i * g_r * (turned * turned + cross * cross)
+    common = both - ((squared + _TIP * _TIP).sqrt() - _TIP)  # what light and view are both shaded from
+    share = z2 / (1 + z2)
+    features = (
+        dip_i + dip_r,
+        dip_i * dip_r,
+        1 - torch.rsqrt((around + 2 * dot).clamp(min=1)),  # of |p + q|^2: the two points on one side of the normal
+        1 - torch.rsqrt((around - 2 * dot).clamp(min=1)),  # and of their distance
+        dot * v_i * v_r,
+        common / (1 + both),
+        share,
+    )
+    scaled = [feature * k for feature, k in zip(features, SCALES, strict=True)]
+    return Coordinates(torch.stack(scaled), 1 + RETURN * common, share)
