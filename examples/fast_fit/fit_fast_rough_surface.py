@@ -29,7 +29,7 @@ SEEDS = {"network": 0, "train": 1, "validate": 2, "report": 61}
 HIDDEN = (16, 12)
 DIRECTIONS = 8000
 # (points, steps, stress) of each stage
-STAGES = ((6000, 60, 0.0), (24000, 50, 0.0), (24000, 15, 1.0))
+STAGES = ((4000, 60, 0.0), (24000, 20, 0.0), (24000, 8, 1.0))
 
 
 def training_data(points: Points) -> Data:
@@ -42,7 +42,7 @@ def training_data(points: Points) -> Data:
 
 def settings() -> dict[str, object]:
     """Of the coordinates: whoever changes one has to run this again."""
-    names = ("KAPPA", "LEVEL", "RETURN", "SCALES")
+    names = ("KAPPA", "LEVEL", "RETURN")
     return {name.lower(): getattr(places, name) for name in names}
 
 

@@ -12,7 +12,7 @@ from torchbrdf.models.oren_nayar.coordinates import Coordinates
 from torchbrdf.models.oren_nayar.fast import CavityFields, fields_from, reflectance
 
 PIECE = 1500  # points at a time: what the Jacobian holds
-FEATURES = 7
+SIZES = (1.2, 3.0, 1.5, 1.5, 1.5, 2.0, 1.5)  # bring the coordinates to one size
 BIASES = (0.0, -2.5, -3.0, -4.0, 0.5)  # of the outputs, for a middling roughness
 DAMPING = (1e-2, 1e-9, 1e8)  # at first, least, and where to give up
 LOUDNESS = (0.3, 6.0)  # bounds of what a residual counts under stress
@@ -29,7 +29,7 @@ def start(hidden: tuple[int, int], seed: int) -> Network:
 
     first, second = hidden
     return Network(
-        drawn(first, FEATURES, 1.2),
+        drawn(first, len(SIZES), 1.2) * torch.tensor(SIZES, dtype=torch.float64),
         drawn(first, 1, 0.7),
         drawn(second, first, 1.5 / math.sqrt(first)),
         drawn(second, 1, 0.5),

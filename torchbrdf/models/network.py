@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-# Bytes of one field worked on at a time: a few dozen of them stay in a core's cache.
-BYTES_AT_A_TIME = 32768
+# Bytes of one field worked on at a time: a dozen of them stay in a core's cache.
+BYTES_AT_A_TIME = 131072
 
 
 class Network(NamedTuple):

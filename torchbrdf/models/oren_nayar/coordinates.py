@@ -17,7 +17,6 @@ from torchbrdf._numerics import positive
 KAPPA = 1.5  # z = KAPPA sigma for small sigma
 LEVEL = 1.25  # [rad] where z levels off: slopes end at 90 degrees, so that a wider Gaussian changes little
 RETURN = 0.5  # of `Coordinates.growth`
-SCALES = (1.2, 3.0, 1.5, 1.5, 1.5, 2.0, 1.5)  # bring the coordinates to one size
 # The tip of the cone is round on this scale, so that every derivative exists there, at the normal and at sigma = 0.
 _TIP = 1e-10
 
@@ -32,13 +31,14 @@ class Coordinates(NamedTuple):
 
 def coordinates(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor, sigma: Tensor) -> Coordinates:
     """From the fields of `Cosines` of these names and sigma [rad], all of one shape (...)."""
+    # Directions alone first: with one sigma for all, its forward derivative starts where z^2 comes in.
+    over = 1 / (light * view)
+    along, across = (phase - light * view) * over, azimuth_sine * over
+    steep_i = (1 - light) * (1 + light) / (light * light)
+    steep_r = (1 - view) * (1 + view) / (view * view)
     s2 = sigma * sigma
     z2 = KAPPA**2 * s2 / (1 + s2 / LEVEL**2)
-    over_light, over_view = 1 / light, 1 / view
-    scale = z2 * over_light * over_view
-    dot, cross = scale * (phase - light * view), scale * azimuth_sine  # p.q and |p x q|
-    t2_i = z2 * ((1 - light) * (1 + light)) * (over_light * over_light)
-    t2_r = z2 * ((1 - view) * (1 + view)) * (over_view * over_view)
+    t2_i, t2_r, dot, cross = z2 * steep_i, z2 * steep_r, z2 * along, z2 * across  # dot = p.q, cross = |p x q|
     v_i, v_r = torch.rsqrt(1 + t2_i), torch.rsqrt(1 + t2_r)
     dip_i, dip_r = 1 - v_i, 1 - v_r
     around = 1 + t2_i + t2_r
@@ -60,5 +60,4 @@ def coordinates(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor
         common / (1 + both),
         share,
     )
-    scaled = [feature * k for feature, k in zip(features, SCALES, strict=True)]
-    return Coordinates(torch.stack(scaled), 1 + RETURN * common, share)
+    return Coordinates(torch.stack(features), 1 + RETURN * common, share)
