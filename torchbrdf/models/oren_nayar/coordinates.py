@@ -48,8 +48,9 @@ def coordinates(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor
     f_i, f_r = t2_i * g_i, t2_r * g_r
     difference, both = f_i - f_r, f_i + f_r
     turned = positive(t2_i * t2_r).sqrt() - dot
-    squared = difference * difference + g_i * g_r * (turned * turned + cross * cross)
-    common = both - ((squared + _TIP * _TIP).sqrt() - _TIP)  # what light and view are both shaded from
+    turn = g_i * g_r * (turned * turned + cross * cross)
+    distance = (difference * difference + turn + _TIP * _TIP).sqrt()
+    common = (4 * f_i * f_r - turn) / (both + distance)  # f_i + f_r less the distance: what both are shaded from
     share = z2 / (1 + z2)
     features = (
         dip_i + dip_r,
