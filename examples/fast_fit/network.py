@@ -101,7 +101,7 @@ def errors_with_slopes(outputs: Tensor, data: Data, albedos: Tensor) -> tuple[Te
 
 def jacobian(network: Network, features: Tensor) -> Tensor:
     """Derivatives of the outputs by all weights (n, 5, weights), in the order of `packed`."""
-    w1, b1, w2, b2, w3, b3 = network
+    w1, b1, w2, b2, w3, _ = network
     u1 = features @ w1.T + b1.T
     h1 = bounded(u1) - bounded(b1.T)
     u2 = h1 @ w2.T + b2.T

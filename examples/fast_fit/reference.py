@@ -94,7 +94,7 @@ def fitted_points(count: int, seed: int, top: float = 89.9) -> Points:
 
 
 def reported_points(
-    count: int, seed: int, low: float, high: float, sigma: tuple[float, ...] = (), crowded: bool = False
+    count: int, seed: int, low: float, high: float, *, sigma: tuple[float, ...] = (), crowded: bool = False
 ) -> Points:
     """Polar angles and azimuths uniform, the larger polar angle in [low, high] degrees, or as `fitted_points`;
     roughness as given [deg], or uniform in 2 to 60 degrees."""

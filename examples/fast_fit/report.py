@@ -15,6 +15,7 @@ from torchbrdf import FastRoughSurface, fast_rough_surface, fixed
 ROUGHNESSES = (2.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0)  # degrees
 DERIVED = (2.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
 FURNACE = torch.tensor([0, 20, 40, 60, 70, 75, 80, 83, 85], dtype=torch.float64)  # degrees
+COUNT = 800  # directions
 STEP = 1e-4  # [rad] of the difference by sigma
 TWICE = Quadrature(panel=16, azimuth=24, slopes=128, modes=16, later=16)
 
@@ -45,11 +46,11 @@ def print_errors(label: str, points: Points, truth: Truth) -> None:
 def report(seed: int) -> None:
     print(f"\nrms/largest error in %, rho {ALBEDOS.tolist()}, sigma 2 to 60 deg")
     for low, high in ((0, 80), (0, 85), (85, 89)):
-        points = reported_points(2000, seed, low, high)
+        points = reported_points(COUNT, seed, low, high)
         print_errors(f"larger angle {low} to {high} deg", points, exact(points))
-    crowded = reported_points(2000, seed + 1, 0, 85, crowded=True)
+    crowded = reported_points(COUNT, seed + 1, 0, 85, crowded=True)
     print_errors("crowded at grazing, in the plane of incidence and at light = view", crowded, exact(crowded))
-    points = reported_points(600, seed + 2, 0, 85, sigma=ROUGHNESSES)
+    points = reported_points(COUNT // 3, seed + 2, 0, 85, sigma=ROUGHNESSES)
     truth = exact(points)
     two, every = errors(points, truth)
     for k, degrees in enumerate(ROUGHNESSES):
@@ -67,7 +68,7 @@ def report(seed: int) -> None:
 
 def print_derivatives(seed: int) -> None:
     """d/dsigma against central differences of the exact model, over its rms."""
-    points = reported_points(400, seed, 0, 85, sigma=DERIVED)
+    points = reported_points(COUNT // 4, seed, 0, 85, sigma=DERIVED)
     high, low = exact(points.moved(STEP)), exact(points.moved(-STEP))
     cosines, one = points.cosines(), torch.ones_like(points.sigma)
     print(f"derivative by sigma: rms error in % of its rms, at rho {ALBEDOS.tolist()} | two bounces || all")
@@ -87,7 +88,7 @@ def print_derivatives(seed: int) -> None:
 def print_convergence(seed: int) -> None:
     """The quadrature of the reference against one of twice the order."""
     for low, high in ((0, 85), (85, 89.9)):
-        points = reported_points(20, seed, low, high)
+        points = reported_points(COUNT // 80, seed, low, high)
         truth, better = exact(points), exact(points, TWICE)
         two = truth.two(ALBEDOS) / better.two(ALBEDOS) - 1
         every = truth.all() / better.all() - 1

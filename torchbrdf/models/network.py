@@ -58,7 +58,7 @@ def _products_are_shortened(device: str) -> bool:
 
 
 def pixel_by_pixel(compute: Callable[..., Sequence[Tensor]], *given: Tensor) -> list[Tensor]:
-    """What `compute` makes of one number a pixel each: all broadcast to (...), a piece that fits the cache at a time."""
+    """What `compute` makes of numbers of one pixel: all broadcast to (...), a piece that fits the cache at a time."""
     shape = torch.broadcast_shapes(*(t.shape for t in given))
     # Spread over the pixels first: the derivative by a single sigma is then one sum over the image.
     rows = [t.expand(shape).reshape(-1) for t in given]

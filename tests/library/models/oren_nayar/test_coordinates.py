@@ -66,7 +66,8 @@ def test_all_are_zero_without_roughness(dtype):
 
 def test_bounded_up_to_the_horizon(dtype):
     edge = torch.finfo(dtype).eps
-    light, view, phase = torch.tensor([[2 * edge, 2 * edge, 0.5], [2 * edge, 1e-3, 2 * edge], [1.0, -1.0, 0.2]]).to(dtype)
+    grazing = [[2 * edge, 2 * edge, 0.5], [2 * edge, 1e-3, 2 * edge], [1.0, -1.0, 0.2]]
+    light, view, phase = torch.tensor(grazing, dtype=dtype)
     found = at(Cosines.from_products(light, view, phase), torch.full_like(light, 1.5))
     assert (found.features.abs() <= 2).all()
     assert found.growth.isfinite().all()
@@ -96,7 +97,8 @@ def test_one_cone_and_no_other_kink():
 
 
 def test_derivatives_exist_where_the_distances_vanish():
-    for angles, sigma in (((0.0, 0.0, 0.0), 0.7), ((0.8, 0.8, 0.0), 0.7), ((0.0, 0.9, 0.0), 0.7), ((0.5, 0.9, 1.0), 0.0)):
+    cases = (((0.0, 0.0, 0.0), 0.7), ((0.8, 0.8, 0.0), 0.7), ((0.0, 0.9, 0.0), 0.7), ((0.5, 0.9, 1.0), 0.0))
+    for angles, sigma in cases:
         c = cosines(*angles)
         given = [t.clone().requires_grad_() for t in (c.light, c.view, c.phase, c.azimuth_sine)]
         width = torch.tensor(sigma, dtype=torch.float64, requires_grad=True)
