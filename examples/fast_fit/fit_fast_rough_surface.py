@@ -34,7 +34,8 @@ STAGES = ((4000, 60, 0.0), (24000, 20, 0.0), (24000, 8, 1.0))
 
 def training_data(points: Points) -> Data:
     c, truth = points.cosines(), exact(points)
-    spread = [t.expand(points.sigma.shape).flatten() for t in (c.light, c.view, c.phase, c.azimuth_sine, points.sigma)]
+    given = (c.light, c.view, c.phase, c.azimuth_sine, places.slope_squared(points.sigma))
+    spread = [t.expand(points.sigma.shape).flatten() for t in given]
     place = places.coordinates(*spread)
     two, every = (t.flatten(0, 1) for t in (truth.two(ALBEDOS), truth.all()))
     return Data(place.features.T, place.growth, place.share, two, every, importance(points).flatten())

@@ -29,19 +29,28 @@ class Coordinates(NamedTuple):
     share: Tensor  # z^2/(1 + z^2) (...)
 
 
-def coordinates(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor, sigma: Tensor) -> Coordinates:
-    """From the fields of `Cosines` of these names and sigma [rad], all of one shape (...)."""
-    # Directions alone first: with one sigma for all, its forward derivative starts where z^2 comes in.
-    over = 1 / (light * view)
-    along, across = (phase - light * view) * over, azimuth_sine * over
-    steep_i = (1 - light) * (1 + light) / (light * light)
-    steep_r = (1 - view) * (1 + view) / (view * view)
+def slope_squared(sigma: Tensor) -> Tensor:
+    """z^2 (...) of sigma (...) [rad]."""
     s2 = sigma * sigma
-    z2 = KAPPA**2 * s2 / (1 + s2 / LEVEL**2)
-    t2_i, t2_r, dot, cross = z2 * steep_i, z2 * steep_r, z2 * along, z2 * across  # dot = p.q, cross = |p x q|
-    v_i, v_r = torch.rsqrt(1 + t2_i), torch.rsqrt(1 + t2_r)
+    return KAPPA**2 * s2 / (1 + s2 / LEVEL**2)
+
+
+def coordinates(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor, squared: Tensor) -> Coordinates:
+    """From the fields of `Cosines` of these names and z^2, all of one shape (...)."""
+    # Directions alone first, and as few operations with a constant as possible: in forward differentiation by one
+    # sigma for all, each of those takes torch longer than its numbers do.
+    over = 1 / (light * view)
+    directions = (
+        (1 - light) * (1 + light) / (light * light),
+        (1 - view) * (1 + view) / (view * view),
+        (phase - light * view) * over,
+        azimuth_sine * over,
+    )
+    t2_i, t2_r, dot, cross = (squared * torch.stack(directions)).unbind(0)  # dot = p.q, cross = |p x q|
+    area_i, area_r = 1 + t2_i, 1 + t2_r
+    v_i, v_r = torch.rsqrt(area_i), torch.rsqrt(area_r)
     dip_i, dip_r = 1 - v_i, 1 - v_r
-    around = 1 + t2_i + t2_r
+    around, twice = area_i + t2_r, dot + dot
     # Facets that one direction shades: vectors of length f = t^4/(1 + t^2)^(3/2) along p and q, and their distance.
     # 2 f_i f_r (1 - cos(dphi)) is written with (|p||q| - p.q)^2 + |p x q|^2, which keeps its digits at dphi = 0.
     g_i, g_r = t2_i * (v_i * v_i * v_i), t2_r * (v_r * v_r * v_r)
@@ -50,13 +59,14 @@ def coordinates(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor
     turned = positive(t2_i * t2_r).sqrt() - dot
     turn = g_i * g_r * (turned * turned + cross * cross)
     distance = (difference * difference + turn + _TIP * _TIP).sqrt()
-    common = (4 * f_i * f_r - turn) / (both + distance)  # f_i + f_r less the distance: what both are shaded from
-    share = z2 / (1 + z2)
+    # f_i + f_r less the distance, without its cancellation: what both are shaded from
+    common = ((f_i + f_i) * (f_r + f_r) - turn) / (both + distance)
+    share = squared / (1 + squared)
     features = (
         dip_i + dip_r,
         dip_i * dip_r,
-        1 - torch.rsqrt((around + 2 * dot).clamp(min=1)),  # of |p + q|^2: the two points on one side of the normal
-        1 - torch.rsqrt((around - 2 * dot).clamp(min=1)),  # and of their distance
+        1 - torch.rsqrt((around + twice).clamp(min=1)),  # of |p + q|^2: the two points on one side of the normal
+        1 - torch.rsqrt((around - twice).clamp(min=1)),  # and of their distance
         dot * v_i * v_r,
         common / (1 + both),
         share,

@@ -13,7 +13,7 @@ from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.fields import FieldBRDF
 from torchbrdf.models.network import Network, bounded, pixel_by_pixel
-from torchbrdf.models.oren_nayar.coordinates import Coordinates, coordinates
+from torchbrdf.models.oren_nayar.coordinates import Coordinates, coordinates, slope_squared
 from torchbrdf.models.oren_nayar.functional import OrenNayar
 from torchbrdf.models.rungs import Member, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, kept
@@ -43,11 +43,13 @@ _FIT = Network.of(json.loads(Path(__file__).with_name("fast_rough_surface.json")
 def cavity_fields(cosines: Cosines, sigma: Tensor) -> CavityFields:
     """The fields (...) at directions (...), for sigma (...) [rad]; finite below the horizon."""
     c = cosines
-    return CavityFields(*pixel_by_pixel(_fields, c.light, c.view, c.phase, c.azimuth_sine, sigma))
+    # At least 1-D: forward differentiation of "number * 0-d float32 tensor" yields float64.
+    squared = slope_squared(torch.atleast_1d(sigma)).reshape(sigma.shape)
+    return CavityFields(*pixel_by_pixel(_fields, c.light, c.view, c.phase, c.azimuth_sine, squared))
 
 
-def _fields(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor, sigma: Tensor) -> CavityFields:
-    return fields_from(coordinates(light, view, phase, azimuth_sine, sigma), _FIT)
+def _fields(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor, squared: Tensor) -> CavityFields:
+    return fields_from(coordinates(light, view, phase, azimuth_sine, squared), _FIT)
 
 
 def fields_from(place: Coordinates, network: Network) -> CavityFields:

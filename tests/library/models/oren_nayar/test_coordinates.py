@@ -8,7 +8,7 @@ import torch
 from torch.testing import assert_close
 
 from torchbrdf import Cosines
-from torchbrdf.models.oren_nayar.coordinates import KAPPA, LEVEL, RETURN, coordinates
+from torchbrdf.models.oren_nayar.coordinates import KAPPA, LEVEL, RETURN, coordinates, slope_squared
 
 RNG = np.random.default_rng(3)
 ANGLES = [*(RNG.uniform(0, (1.55, 1.55, math.pi)) for _ in range(20)), (0.0, 1.0, 0.0), (0.9, 0.9, 0.0)]
@@ -23,7 +23,7 @@ def cosines(theta_i: float, theta_r: float, delta: float, dtype: torch.dtype = t
 
 
 def at(c: Cosines, sigma: torch.Tensor):
-    return coordinates(c.light, c.view, c.phase, c.azimuth_sine, sigma)
+    return coordinates(c.light, c.view, c.phase, c.azimuth_sine, slope_squared(sigma))
 
 
 def by_angles(theta_i: float, theta_r: float, delta: float, sigma: float) -> tuple[np.ndarray, float, float]:
@@ -102,7 +102,7 @@ def test_derivatives_exist_where_the_distances_vanish():
         c = cosines(*angles)
         given = [t.clone().requires_grad_() for t in (c.light, c.view, c.phase, c.azimuth_sine)]
         width = torch.tensor(sigma, dtype=torch.float64, requires_grad=True)
-        first = torch.autograd.grad(coordinates(*given, width).features.sum(), (*given, width), create_graph=True)
+        first = torch.autograd.grad(coordinates(*given, slope_squared(width)).features.sum(), (*given, width), create_graph=True)
         second = torch.autograd.grad(sum(first), (*given, width))
         assert all(t.isfinite() for t in (*first, *second))
         if sigma == 0:
