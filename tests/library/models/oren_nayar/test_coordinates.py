@@ -102,7 +102,8 @@ def test_derivatives_exist_where_the_distances_vanish():
         c = cosines(*angles)
         given = [t.clone().requires_grad_() for t in (c.light, c.view, c.phase, c.azimuth_sine)]
         width = torch.tensor(sigma, dtype=torch.float64, requires_grad=True)
-        first = torch.autograd.grad(coordinates(*given, slope_squared(width)).features.sum(), (*given, width), create_graph=True)
+        total = coordinates(*given, slope_squared(width)).features.sum()
+        first = torch.autograd.grad(total, (*given, width), create_graph=True)
         second = torch.autograd.grad(sum(first), (*given, width))
         assert all(t.isfinite() for t in (*first, *second))
         if sigma == 0:
