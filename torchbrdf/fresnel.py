@@ -7,7 +7,7 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import safe_divide, safe_sqrt
+from torchbrdf._numerics import positive, root, safe_sqrt
 from torchbrdf.parameters import (
     ABSORPTION_INDEX,
     ALBEDO,
@@ -21,7 +21,8 @@ from torchbrdf.parameters import (
 from torchbrdf.quadrature import gauss_legendre
 
 # Relative index of a dielectric seen from either side; total internal reflection below 1.
-RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1)
+# No matter has an index nearer to 0 than a hundredth; at 0 itself the formulas are 0/0.
+RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1, least=0.01)
 
 
 def schlick(cos: Tensor, *, f0: Tensor) -> Tensor:
@@ -87,14 +88,14 @@ def conductor(cos: Tensor, *, eta: Tensor, k: Tensor) -> Tensor:
 
     Args:
         cos: cosine c of incidence, broadcasts with eta and k. [-] in (0, 1]
-        eta, k: real and imaginary part of the relative index. [-] > 0, >= 0
+        eta, k: real and imaginary part of the relative index. [-] > 0, >= 0; 0/0 at 0 and 0
     Returns: F, shapes broadcast. [-]
     Deviations: none; k = 0 is `dielectric`.
     Source: Born & Wolf 1999, Principles of Optics, 7th edition, DOI 10.1017/CBO9781139644181, ch. 14.
     """
     sine_squared = ((1 - cos) * (1 + cos)).relu()
     a_squared, b_squared = _refracted_squares(cos, eta, k)
-    a = safe_sqrt(a_squared)
+    a = root(a_squared)
     r_s = ((cos - a) ** 2 + b_squared) / ((cos + a) ** 2 + b_squared)
     absorbed = cos * cos * b_squared
     p_over_s = ((cos * a - sine_squared) ** 2 + absorbed) / ((cos * a + sine_squared) ** 2 + absorbed)
@@ -129,11 +130,15 @@ def _refracted_squares(cos: Tensor, eta: Tensor, k: Tensor) -> tuple[Tensor, Ten
     """a^2 and b^2 of a + i b = sqrt((eta + i k)^2 - 1 + cos^2), the smaller without cancellation."""
     real = (eta - 1) * (eta + 1) - k * k + cos * cos
     imaginary = 2 * eta * k
-    modulus = safe_sqrt(real * real + imaginary * imaginary)
+    imaginary_squared = imaginary * imaginary
+    modulus = root(real * real + imaginary_squared)
     larger = 0.5 * (modulus + real.abs())
-    smaller = safe_divide(imaginary * imaginary, 4 * larger, where=larger > 0)
-    propagating = real >= 0
-    return torch.where(propagating, larger, smaller), torch.where(propagating, smaller, larger)
+    smaller = imaginary_squared / (4 * positive(larger))
+    # chosen by products with 1 and 0, which are exact and take a tenth of the time
+    propagating = (real >= 0).to(larger.dtype)
+    evanescent = 1 - propagating
+    a_squared = torch.addcmul(larger * propagating, smaller, evanescent)
+    return a_squared, torch.addcmul(smaller * propagating, larger, evanescent)
 
 
 def dielectric_average(*, eta: Tensor) -> Tensor:
@@ -251,7 +256,7 @@ class Dielectric(Fresnel):
 
 @final
 class Conductor(Fresnel):
-    """`conductor` with complex index eta + i k, each scalar, (channel,) or (..., channel). [-] > 0, > 0"""
+    """`conductor` with complex index eta + i k, each scalar, (channel,) or (..., channel). [-] >= 0.01, >= 0"""
 
     eta: Constrained = Constrained(RELATIVE_INDEX)
     k: Constrained = Constrained(ABSORPTION_INDEX)

@@ -8,7 +8,8 @@ from typing import Any, ClassVar, TypeAlias, overload
 import torch
 from torch import Tensor, nn
 
-from torchbrdf._numerics import SUPPORTED_DTYPES, holds, unit_tolerance
+from torchbrdf._numerics import SUPPORTED_DTYPES, holds, number, unit_tolerance
+from torchbrdf.checks import checked, taken_on_trust
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,7 @@ class Interval:
     `unit` is "rad", or "" for a pure number. `even` says that reflectance depends on the square of the
     parameter near low = 0, so that its derivative vanishes there: sigma is told from 0 through sigma^2.
     `trailing` axes of the parameter are its own (channel, part); axes before them are pixels.
+    `least`, where it is above low, is the smallest value that a formula can compute: no value below it is accepted.
 
     The closed interval is what a formula accepts. A trained value lives in the open one, through a
     logistic map (an exponential where high is infinite): it approaches a bound until rounding sees no
@@ -29,6 +31,7 @@ class Interval:
     unit: str = ""
     even: bool = False
     trailing: int = 0
+    least: float = -math.inf
 
     @property
     def angular(self) -> bool:
@@ -36,20 +39,35 @@ class Interval:
         return self.unit == "rad"
 
     def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
-        """Raise ValueError unless every entry lies in the domain (strictly inside if `open_ends`)."""
+        """Raise ValueError unless every entry lies in the domain (strictly inside if `open_ends`).
+
+        Not inside `torchbrdf.unchecked()`.
+        """
+        if taken_on_trust():
+            return
         if not isinstance(value, Tensor):
             raise TypeError(f"{name} must be a torch.Tensor; found {type(value).__name__}.")
-        inside = (value > self.low) & (value < self.high) if open_ends else (value >= self.low) & (value <= self.high)
-        if holds(inside):
+        if value.numel() == 0:
             return
+
+        low = max(self.low, self.least)
+
+        def inside_of(x: Tensor) -> Tensor:
+            above = x > low if open_ends and low == self.low else x >= low
+            return above & (x < self.high if open_ends else x <= self.high)
+
+        # the extremes stand for all: those of what holds a NaN are NaN, which lies nowhere
+        if holds(inside_of(torch.stack(torch.aminmax(value.detach())))):
+            return
+        inside = inside_of(value)
         finite = value[value.isfinite()]
         extent = f"min {finite.min():.6g}, max {finite.max():.6g}" if finite.numel() else "none is finite"
-        opening = "(" if open_ends else "["
+        opening = "(" if open_ends and low == self.low else "["
         closing = ")" if open_ends or math.isinf(self.high) else "]"
         unit = f" {self.unit}" if self.unit else ""
         remedy = " A trained value cannot sit on a bound: hold it there with fixed(...)." if open_ends else ""
         raise ValueError(
-            f"{name} must lie in {opening}{self.low:.4g}, {self.high:.4g}{closing}{unit}; "
+            f"{name} must lie in {opening}{low:.4g}, {self.high:.4g}{closing}{unit}; "
             f"{int((~inside).sum())} of {inside.numel()} entries do not ({extent}).{remedy}"
         )
 
@@ -61,10 +79,11 @@ class Interval:
 
     def from_raw(self, raw: Tensor) -> Tensor:
         """Value inside the domain for any real number."""
-        # At least 1-D inside: forward differentiation of "number * 0-d float32 tensor" yields float64.
-        row = torch.atleast_1d(raw)
-        inside = row.exp() if self.high == math.inf else (self.high - self.low) * row.sigmoid()
-        return (self.low + inside).reshape(raw.shape)
+        inside = raw.exp() if self.high == math.inf else raw.sigmoid()
+        width = 1.0 if self.high == math.inf else self.high - self.low
+        # numbers as tensors: forward differentiation of "number * 0-d float32 tensor" yields float64
+        scaled = inside if width == 1 else inside * number(width, raw)
+        return scaled if self.low == 0 else scaled + number(self.low, raw)
 
 
 @dataclass(frozen=True)
@@ -83,7 +102,12 @@ class Simplex:
     angular: ClassVar[bool] = False
 
     def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
-        """Raise ValueError unless the entries are shares (all above 0 if `open_ends`)."""
+        """Raise ValueError unless the entries are shares (all above 0 if `open_ends`).
+
+        Not inside `torchbrdf.unchecked()`.
+        """
+        if taken_on_trust():
+            return
         if value.ndim == 0:
             raise ValueError(f"{name} must hold shares along its last axis; found a single number.")
         total = value.sum(-1)
@@ -112,6 +136,7 @@ EXPONENT = Interval(0.0, math.inf)
 # Below this microfacet width the lobe is narrower than float32 cosines resolve: use Mirror.
 NARROWEST = 1e-3
 WIDTH = Interval(NARROWEST, 1.0)
+FACET_ROUGHNESS = Interval(0.0, math.pi / 2, "rad", even=True, least=NARROWEST)
 REFRACTIVE_INDEX = Interval(1.0, math.inf, trailing=1)
 ABSORPTION_INDEX = Interval(0.0, math.inf, trailing=1)
 
@@ -139,6 +164,7 @@ class Constrained:
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
+        self._raw, self._fixed = f"raw_{name}", f"fixed_{name}"
 
     @overload
     def __get__(self, module: None, owner: type) -> "Constrained": ...
@@ -147,9 +173,9 @@ class Constrained:
     def __get__(self, module, owner):
         if module is None:
             return self
-        if f"fixed_{self.name}" in module._buffers:
-            return getattr(module, f"fixed_{self.name}")
-        return self.domain.from_raw(getattr(module, f"raw_{self.name}"))
+        if self._fixed in module._buffers:
+            return getattr(module, self._fixed)
+        return self.domain.from_raw(getattr(module, self._raw))
 
     def __set__(self, module: nn.Module, value: ParameterValue) -> None:
         held = isinstance(value, fixed)
@@ -163,8 +189,9 @@ class Constrained:
         tensor = _as_float_tensor(given)
         if tensor.dtype not in SUPPORTED_DTYPES:
             raise TypeError(f"{name} must be float32 or float64; found {tensor.dtype}.")
-        self.domain.check(name, tensor, open_ends=not held)
-        raw_name, fixed_name = f"raw_{self.name}", f"fixed_{self.name}"
+        with checked():  # the value outlives any context
+            self.domain.check(name, tensor, open_ends=not held)
+        raw_name, fixed_name = self._raw, self._fixed
         if held:
             module._parameters.pop(raw_name, None)
             module.register_buffer(fixed_name, tensor.clone())
