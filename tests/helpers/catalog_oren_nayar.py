@@ -4,6 +4,7 @@ import math
 
 import torch
 
+from helpers.coarse_tables import COARSE_ROUGH
 from helpers.materials import Model, brushed, colour, number
 from torchbrdf import (
     BRDF,
@@ -11,6 +12,7 @@ from torchbrdf import (
     ClosedFormRoughSurface,
     ClosedFormVCavities,
     FastRoughSurface,
+    InterpolatedRoughSurface,
     Lambert,
     OrenNayar,
     QualitativeOrenNayar,
@@ -142,6 +144,24 @@ OREN_NAYAR = [
     Model(
         "fast rough surface, fixed sigma = 0",
         lambda dtype: FastRoughSurface(albedo=colour(dtype), sigma=fixed(number(0.0, dtype))),
+        captured=False,
+    ),
+    Model(
+        "interpolated rough surface",
+        lambda dtype: InterpolatedRoughSurface(albedo=colour(dtype), sigma=number(0.5, dtype), grid=COARSE_ROUGH),
+    ),
+    Model(
+        "interpolated rough surface, white",
+        lambda dtype: InterpolatedRoughSurface(
+            albedo=fixed(number(1.0, dtype)), sigma=number(0.9, dtype), grid=COARSE_ROUGH
+        ),
+        captured=False,
+    ),
+    Model(
+        "interpolated rough surface, fixed sigma = 0",
+        lambda dtype: InterpolatedRoughSurface(
+            albedo=colour(dtype), sigma=fixed(number(0.0, dtype)), grid=COARSE_ROUGH
+        ),
         captured=False,
     ),
     Model(
