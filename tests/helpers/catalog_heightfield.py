@@ -78,6 +78,7 @@ HEIGHTFIELD = [
             albedo=colour(dtype), sigma=number(0.5, dtype), nodes=160, grid=COARSE_HEIGHTFIELD
         ),
         captured=False,
+        float32=ROUNDED,
     ),
     Model(
         "anisotropic gaussian heightfield",

@@ -21,13 +21,17 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import safe_divide, safe_sqrt
+from torchbrdf._numerics import cross, length, safe_divide, safe_sqrt
 from torchbrdf.directions import Cosines
 
 _MIDDLE = 1.5  # c, the radius in the middle of [0, inf): 65 deg
 _TURN = 0.3  # k
 MOST_GRAZING = math.cos(math.radians(89.95))  # nearer to the horizon reflectance is held
 _DEEPEST = 1 / (1 + _MIDDLE / math.acosh(1 / MOST_GRAZING))  # x there
+
+# |P| |Q|, and |P - Q| |P + Q| over (|P - Q| + |P + Q|)^2, below which the azimuth, or the direction from a cone, is
+# rounding
+_TIP = {torch.float64: 1e-10, torch.float32: 1e-5}
 
 
 class GeometryCoordinates(NamedTuple):
@@ -40,31 +44,51 @@ class GeometryCoordinates(NamedTuple):
 
 
 def geometry_coordinates(cosines: Cosines) -> GeometryCoordinates:
-    """Coordinates of directions (...). Lengths that are 0 have zero gradient: only at a cone is that a choice."""
-    alpha, beta = cosines.alpha.clamp(min=MOST_GRAZING), cosines.beta.clamp(min=MOST_GRAZING)
-    (far, far_ratio), (near, near_ratio) = _radius(alpha), _radius(beta)
-    ratios = far_ratio * near_ratio
+    """Coordinates of directions (...). At a cone, P = Q or P = -Q, apart and slant have zero gradient."""
+    (light, light_ratio), (view, view_ratio) = (_radius(*part) for part in _cosines_and_sines(cosines))
+    far, near = torch.maximum(light, view), torch.minimum(light, view)
+    ratios = light_ratio * view_ratio
     product, dot, across = far * near, cosines.in_plane * ratios, cosines.azimuth_sine * ratios
-    # |P| |Q| (1 -+ cos(dphi)), the smaller of the two by the product of both
-    forward, backward = dot > 0, dot < 0
+    # |P| |Q| (1 -+ cos(dphi)); next to a cone, where one is a difference of equals, by the product of both
     apart, opposed = product - dot, product + dot
+    tilted = product > _TIP[product.dtype]  # next to the normal all of this is rounding
+    forward, backward = ((2 * part < product) & tilted for part in (apart, opposed))
     squared = across * across
-    apart = torch.where(forward, safe_divide(squared, opposed, where=forward), apart)
-    opposed = torch.where(backward, safe_divide(squared, apart, where=backward), opposed)
+    apart, opposed = (
+        torch.where(forward, safe_divide(squared, opposed, where=forward), apart),
+        torch.where(backward, safe_divide(squared, apart, where=backward), opposed),
+    )
     turn = _turn(near, safe_divide(near, far, where=far > 0))
     turn = turn * turn
     met = product > 0
-    kept = safe_divide(2 * product, turn * apart + opposed, where=met) + (~met).to(product)  # of sum 2 |P| |Q|
+    kept = safe_divide(2 * product, turn * apart + opposed, where=met) + (~met).to(product)  # their sum stays 2 |P| |Q|
     apart, opposed = turn * kept * apart, kept * opposed
-    difference = far - near
+    difference, total = far - near, far + near
     first, second = (safe_sqrt(difference * difference + 2 * part) for part in (apart, opposed))
-    total, both = first + second, first * second
+    perimeter, both = first + second, first * second
+    v = safe_divide(first, perimeter, where=perimeter > 0)
+    z = safe_divide(difference * total, both, where=both > 0)
+    # There slant is rounding, and which direction is the more grazing one: of both, half the derivative.
+    tip = both <= _TIP[both.dtype] * perimeter * perimeter
+    depth = torch.where(tip, 0.5 * total, far)
     return GeometryCoordinates(
-        far / (_MIDDLE + far) / _DEEPEST,
-        safe_divide(first, total, where=total > 0),
-        safe_divide(difference * (far + near), both, where=both > 0),
-        0.5 * (alpha + beta),
+        depth / (_MIDDLE + depth) / _DEEPEST,
+        torch.where(tip, v.detach(), v),
+        torch.where(tip, z.detach(), z),
+        0.5 * (cosines.light.clamp(min=MOST_GRAZING) + cosines.view.clamp(min=MOST_GRAZING)),
     )
+
+
+def _cosines_and_sines(cosines: Cosines) -> tuple[tuple[Tensor, Tensor], tuple[Tensor, Tensor]]:
+    """Cosine and sine of light and of view, each (...): with all digits of a small sine where the vectors are known."""
+    light, view = cosines.light, cosines.view
+    if cosines.vectors is None:
+        sines = [safe_sqrt((1 - c) * (1 + c)) for c in (light, view)]
+    else:
+        normal, *directions = cosines.vectors
+        sines = [length(cross(normal, d)).masked_fill(~cosines.above_horizon, 0.0) for d in directions]
+    light, view = (c.clamp(min=MOST_GRAZING) for c in (light, view))
+    return (light, sines[0]), (view, sines[1])
 
 
 def angles_at(depth: Tensor, apart: Tensor, slant: Tensor) -> tuple[Tensor, Tensor, Tensor]:
@@ -86,9 +110,8 @@ def _turn(near: Tensor, share: Tensor) -> Tensor:
     return 1 + _TURN * (near * share) ** 2
 
 
-def _radius(cosine: Tensor) -> tuple[Tensor, Tensor]:
+def _radius(cosine: Tensor, sine: Tensor) -> tuple[Tensor, Tensor]:
     """r = ln((1 + sin)/cos) and r/sin (...), 1 at the normal, where both have zero gradient."""
-    sine = safe_sqrt((1 - cosine) * (1 + cosine))
     radius = torch.log1p(sine) - cosine.log()
     tilted = sine > 0
     return radius, safe_divide(radius, sine, where=tilted) + (~tilted).to(sine)

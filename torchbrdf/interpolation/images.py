@@ -74,16 +74,11 @@ def image_table(name: str, settings: str, sources: Iterable[Path], sample: Sampl
     return ImageTable(*(SplineTable.of(torch.from_numpy(arrays[key])) for key in ImageTable._fields))
 
 
-@torch.compiler.assume_constant_result
-def table_like(table: Callable[[Key], ImageTable], key: Key, dtype: torch.dtype, device: torch.device) -> ImageTable:
-    """`table(key)` in a dtype, on a device: built, read and converted once."""
-    return _converted(table, key, dtype, device)
-
-
 @lru_cache(maxsize=16)
-def _converted(
-    table: Callable[[Hashable], ImageTable], key: Hashable, dtype: torch.dtype, device: torch.device
+def converted(
+    table: Callable[[Key], ImageTable], key: Key, dtype: torch.dtype, device: torch.device
 ) -> ImageTable:
+    """`table(key)` in a dtype, on a device: built, read and converted once."""
     return table(key).to(torch.empty((), dtype=dtype, device=device))
 
 

@@ -37,12 +37,12 @@ class SplineTable(NamedTuple):
 
     def to(self, like: Tensor) -> "SplineTable":
         """In the dtype and on the device of `like`."""
-        return self._replace(rows=self.rows.to(like))
+        return SplineTable(self.rows.to(like), self.counts)
 
     def times(self, matrix: Tensor) -> "SplineTable":
         """The table whose columns are these times a matrix (column, new column)."""
         rows = self.rows.unflatten(-1, (TAPS, -1)).to(matrix.dtype)
-        return self._replace(rows=(rows @ matrix).flatten(-2))
+        return SplineTable((rows @ matrix).flatten(-2), self.counts)
 
 
 def sites(count: int) -> np.ndarray:
@@ -77,7 +77,7 @@ def interpolate(table: SplineTable, coordinates: Sequence[Tensor]) -> Tensor:
     """
     dtype = reduce(torch.promote_types, (u.dtype for u in coordinates), table.rows.dtype)
     points = torch.broadcast_tensors(*(u.to(dtype) for u in coordinates))
-    table = table._replace(rows=table.rows.to(dtype))
+    table = SplineTable(table.rows.to(dtype), table.counts)
     if torch.compiler.is_compiling() or any(map(_is_transformed, (table.rows, *points))) or table.rows.requires_grad:
         return _by_tensor_operations(table, points)
     shape = points[0].shape
@@ -89,12 +89,17 @@ def interpolate(table: SplineTable, coordinates: Sequence[Tensor]) -> Tensor:
 class _Interpolated(torch.autograd.Function):
     """Values at points (P,) with first derivatives by the same gathers."""
 
+    generate_vmap_rule = True  # never used: what is mapped goes by tensor operations, and the rest passes through
+
     @staticmethod
-    def forward(ctx: Any, rows: Tensor, counts: tuple[int, ...], *points: Tensor) -> Tensor:
-        ctx.save_for_backward(rows, *points)
-        ctx.counts = counts
+    def forward(rows: Tensor, counts: tuple[int, ...], *points: Tensor) -> Tensor:  # pyright: ignore[reportIncompatibleMethodOverride]
         places, weights = _places(counts, points)
         return _bag(rows, places, weights)
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Any, ...], output: Tensor) -> None:
+        rows, ctx.counts, *points = inputs
+        ctx.save_for_backward(rows, *points)
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, ...]:  # pyright: ignore[reportIncompatibleMethodOverride]

@@ -61,13 +61,13 @@ def interpolated(
 ) -> Tensor:
     """f_r (..., channel) [1/sr], finite below the horizon, of one table in the dtypes of cosines and of sigma.
 
-    Of a material that is the same everywhere and whose derivatives are not asked for, the table is contracted first.
+    Where no derivatives are asked for, and the material is the same everywhere, the table is contracted first.
     """
     at = geometry_coordinates(cosines)
     coefficients = _shares(of_material, sigma, albedo)
     coefficients = coefficients.to(torch.promote_types(coefficients.dtype, at.depth.dtype))
     smooth, shares = coefficients[..., 0], coefficients[..., 1:]
-    if coefficients.ndim == 2 and not (coefficients.requires_grad and torch.is_grad_enabled()):
+    if coefficients.ndim == 2 and not torch.is_grad_enabled():
         return smooth + _images(of_geometry.geometry.times(shares.mT), at)
     images = _images(of_geometry.geometry, at).to(coefficients.dtype)
     if coefficients.ndim == 2:
@@ -78,7 +78,7 @@ def interpolated(
 def _shares(table: ImageTable, sigma: Tensor, albedo: Tensor) -> Tensor:
     """What a material takes of each image (..., channel, 1 + R) [1/sr]."""
     rho = torch.atleast_1d(albedo)
-    shares = interpolate(table.material, (roughness_coordinate(sigma)[..., None], albedo_coordinate(rho)))
+    shares = interpolate(table.material, (roughness_coordinate(sigma[..., None]), albedo_coordinate(rho)))
     smooth = torch.full_like(shares[..., :1], 1 / math.pi)
     return rho[..., None] * torch.cat((smooth, shares), -1)
 

@@ -10,7 +10,7 @@ from torch import Tensor
 from torchbrdf import effects
 from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
-from torchbrdf.interpolation.images import ImageTable, TableGrid, image_table, table_like
+from torchbrdf.interpolation.images import ImageTable, TableGrid, converted, image_table
 from torchbrdf.interpolation.surface import InterpolatedSurface, interpolated
 from torchbrdf.models.heightfield.fast import FastGaussianHeightfield
 from torchbrdf.models.heightfield.surface import OCCLUSION, Settings, heightfield_fields
@@ -65,6 +65,11 @@ def heightfield_table(key: HeightfieldTable) -> ImageTable:
     return image_table("heightfield", f"{key.occlusion!r}, {key.settings}", [Path(__file__).parent], sample, key.grid)
 
 
+@torch.compiler.assume_constant_result
+def _table_in(key: HeightfieldTable, dtype: torch.dtype, device: torch.device) -> ImageTable:
+    return converted(heightfield_table, key, dtype, device)
+
+
 def interpolated_gaussian_heightfield(
     cosines: Cosines,
     *,
@@ -100,7 +105,7 @@ def interpolated_gaussian_heightfield(
     ROUGHNESS.check(f"{name}: sigma", sigma)
     key = HeightfieldTable(occlusion, nodes, grid)
     key.check(name)
-    tables = (table_like(heightfield_table, key, t.dtype, t.device) for t in (cosines.light, sigma))
+    tables = (_table_in(key, t.dtype, t.device) for t in (cosines.light, sigma))
     return cosines.zero_below_horizon(interpolated(cosines, *tables, albedo=albedo, sigma=sigma))
 
 
@@ -141,7 +146,7 @@ class InterpolatedGaussianHeightfield(InterpolatedSurface):
         return self.sigma, self.albedo
 
     def table(self, like: Tensor) -> ImageTable:
-        return table_like(heightfield_table, self.key, like.dtype, like.device)
+        return _table_in(self.key, like.dtype, like.device)
 
     def members(self) -> list[Member]:
         """The ladder up to this model; without occlusion near by only Lambert lies below."""

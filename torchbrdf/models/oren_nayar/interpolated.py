@@ -4,12 +4,13 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, final
 
+import torch
 from torch import Tensor
 
 from torchbrdf import effects
 from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
-from torchbrdf.interpolation.images import ImageTable, TableGrid, image_table, table_like
+from torchbrdf.interpolation.images import ImageTable, TableGrid, converted, image_table
 from torchbrdf.interpolation.surface import InterpolatedSurface, interpolated
 from torchbrdf.models.oren_nayar.fast import FastRoughSurface
 from torchbrdf.models.oren_nayar.many_roughnesses import SlopeRule, rough_reflectances
@@ -25,6 +26,11 @@ def rough_surface_table(grid: TableGrid) -> ImageTable:
     rule = SlopeRule()
     sample = partial(rough_reflectances, rule=rule)
     return image_table("rough-surface", f"{tuple(rule)}", [Path(__file__).parent], sample, grid)
+
+
+@torch.compiler.assume_constant_result
+def _table_in(grid: TableGrid, dtype: torch.dtype, device: torch.device) -> ImageTable:
+    return converted(rough_surface_table, grid, dtype, device)
 
 
 def interpolated_rough_surface(
@@ -54,7 +60,7 @@ def interpolated_rough_surface(
     ALBEDO.check(f"{name}: albedo", albedo)
     ROUGHNESS.check(f"{name}: sigma", sigma)
     grid.check(name)
-    tables = (table_like(rough_surface_table, grid, t.dtype, t.device) for t in (cosines.light, sigma))
+    tables = (_table_in(grid, t.dtype, t.device) for t in (cosines.light, sigma))
     return cosines.zero_below_horizon(interpolated(cosines, *tables, albedo=albedo, sigma=sigma))
 
 
@@ -89,7 +95,7 @@ class InterpolatedRoughSurface(InterpolatedSurface):
         return self.sigma, self.albedo
 
     def table(self, like: Tensor) -> ImageTable:
-        return table_like(rough_surface_table, self.grid, like.dtype, like.device)
+        return _table_in(self.grid, like.dtype, like.device)
 
     def members(self) -> list[Member]:
         """The ladder up to this model."""
