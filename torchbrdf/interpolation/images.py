@@ -7,7 +7,8 @@ geometry and all sites of the material: of all sums of R products the nearest on
 """
 
 import math
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple, TypeVar
@@ -83,7 +84,7 @@ def converted(
 
 
 def _built(sample: Sample, grid: TableGrid) -> Arrays:
-    with torch.no_grad():
+    with torch.no_grad(), _one_thread():
         sigma = sigma_at(torch.from_numpy(sites(grid.sigmas)))
         albedo = albedo_at(torch.from_numpy(sites(grid.albedos)))
         axes = (torch.from_numpy(sites(count)) for count in grid[:3])
@@ -98,6 +99,17 @@ def _built(sample: Sample, grid: TableGrid) -> Arrays:
         "geometry": spline_coefficients(images.reshape(*grid[:3], -1), 3),
         "material": spline_coefficients(shares.reshape(*grid[3:5], -1), 2),
     }
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Arrays that fit a core's cache are not worth sharing: on a busy machine the threads only wait for each other."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(threads)
 
 
 def _leading(samples: np.ndarray, weight: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
