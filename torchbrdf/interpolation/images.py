@@ -76,9 +76,7 @@ def image_table(name: str, settings: str, sources: Iterable[Path], sample: Sampl
 
 
 @lru_cache(maxsize=16)
-def converted(
-    table: Callable[[Key], ImageTable], key: Key, dtype: torch.dtype, device: torch.device
-) -> ImageTable:
+def converted(table: Callable[[Key], ImageTable], key: Key, dtype: torch.dtype, device: torch.device) -> ImageTable:
     """`table(key)` in a dtype, on a device: built, read and converted once."""
     return table(key).to(torch.empty((), dtype=dtype, device=device))
 
@@ -90,7 +88,7 @@ def _built(sample: Sample, grid: TableGrid) -> Arrays:
         axes = (torch.from_numpy(sites(count)) for count in grid[:3])
         angles = angles_at(*(axis.flatten() for axis in torch.meshgrid(*axes, indexing="ij")))
         pieces = zip(*(angle.split(_GEOMETRIES_AT_A_TIME) for angle in angles), strict=True)
-        values = torch.cat([sample(*piece, sigma, albedo) for piece in pieces]).flatten(1).numpy()
+        values = torch.cat([sample(a, b, dphi, sigma, albedo) for a, b, dphi in pieces]).flatten(1).numpy()
     mean_cosine = (0.5 * (angles[0].cos() + angles[1].cos())).numpy()[:, None]
     rough = np.repeat(sigma.numpy() > 0, grid.albedos)
     excess = np.where(rough, values - 1 / math.pi, 0.0) * mean_cosine

@@ -3,8 +3,8 @@ r"""Two coordinates of a rough diffuse material, roughness and albedo, in which 
 .. math:: s = \frac{\ln(1 + \sigma^2/a^2)}{\ln(1 + (\pi/2)^2/a^2)},\quad
     t = \frac{\sqrt{1 + b^2} - \sqrt{1 - \rho + b^2}}{\sqrt{1 + b^2} - b}
 
-Even in sigma next to 0, and finer for small sigma, whose effects lie within sigma of the horizon; finer for white facets,
-between which light bounces for long.
+Even in sigma next to 0, and finer for small sigma, whose effects lie within sigma of the horizon; finer for white
+facets, between which light bounces for long.
 """
 
 import math

@@ -46,8 +46,8 @@ class SplineTable(NamedTuple):
 
 
 def sites(count: int) -> np.ndarray:
-    """Where on [0, 1] an axis of `count` coefficients, at least six, takes its values: the ends, the knots, and one point more in
-    the first and in the last cell.
+    """Where on [0, 1] an axis of `count` coefficients, at least six, takes its values: the ends, the knots, and one
+    point more in the first and in the last cell.
     """
     if count < FEWEST_SITES:
         raise ValueError(f"an axis of a spline table needs at least {FEWEST_SITES} sites; found {count}.")

@@ -52,7 +52,7 @@ def test_a_box_holds_all_directions_and_each_of_its_points_is_one():
     for dtype in (torch.float32, F64):
         at = geometry_coordinates(Cosines.of(*random_directions(5000, dtype=dtype, max_angle=1.5707)))
         for part in at[:3]:
-            assert (part > -1e-5).all() and (part < 1 + 1e-5).all()
+            assert ((part > -1e-5) & (part < 1 + 1e-5)).all()
 
 
 def test_cones_are_faces():

@@ -14,7 +14,7 @@ from torchbrdf.interpolation.materials import albedo_coordinate, roughness_coord
 from torchbrdf.interpolation.splines import interpolate
 from torchbrdf.testing import random_directions
 
-GRID = TableGrid(depth=18, apart=18, slant=12, sigmas=8, albedos=6, images=2)
+GRID = TableGrid(depth=14, apart=12, slant=10, sigmas=8, albedos=6, images=2)
 
 
 def excess(cos_i, cos_r, in_plane, sigma, rho):
@@ -46,7 +46,7 @@ def test_two_images_are_found(table):
     for degrees, rho in ((3.0, 0.2), (25.0, 0.9), (70.0, 0.55)):
         sigma, albedo = torch.tensor(math.radians(degrees), dtype=torch.float64), torch.tensor(rho, dtype=torch.float64)
         expected = excess(cosines.light, cosines.view, cosines.in_plane, sigma, albedo)
-        assert_close(read(table, cosines, sigma, albedo), expected, rtol=0, atol=3e-3)
+        assert_close(read(table, cosines, sigma, albedo), expected, rtol=0, atol=1e-2)  # of 0.002 to 1
 
 
 def test_without_roughness_nothing_is_left(table):

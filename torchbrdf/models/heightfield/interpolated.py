@@ -19,7 +19,7 @@ from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD
 from torchbrdf.models.rungs import Member, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, kept
 
-HEIGHTFIELD_GRID = TableGrid(depth=28, apart=24, slant=13, sigmas=16, albedos=9, images=16)
+HEIGHTFIELD_GRID = TableGrid(depth=28, apart=24, slant=13, sigmas=16, albedos=9, images=20)
 
 
 class HeightfieldTable(NamedTuple):
@@ -84,7 +84,7 @@ def interpolated_gaussian_heightfield(
     .. math:: f_r = \frac\rho\pi + \frac{\rho}{m} \sum_{r=1}^{R} U_r(x, v, z)\, c_r(\sigma, \rho)
 
     with m the mean cosine of light and view, and U, c cubic splines in coordinates of directions and material
-    (`torchbrdf.interpolation`). There is a table for each occlusion, built at the first call, in DEVIATION_SECONDS of
+    (`torchbrdf.interpolation`). There is a table for each occlusion, built at the first call, in about 10 seconds of
     one core, and kept in $TORCHBRDF_CACHE, else $XDG_CACHE_HOME/torchbrdf, else ~/.cache/torchbrdf.
 
     Args:
@@ -97,7 +97,11 @@ def interpolated_gaussian_heightfield(
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo, sigma or occlusion leave their domains, for other nodes, for fewer than 6 sites or
         other than 1 to 25 images.
-    Deviations: TO COME
+    Deviations: from the heightfield at 560 nodes, occlusion 1, sigma 2 to 60 deg, rho 0.1 to 0.95, in units of rho/pi:
+        rms 2e-4 and at most 4e-3 (next to light = view at grazing) where the more grazing direction is within 85 deg,
+        5e-4 and 4e-3 up to 89 deg, 4e-3 and 4e-2 up to 89.9 deg (`examples/benchmarks/interpolated_surfaces.py`); from
+        89.95 deg on held. Has the subgradient 0 at light = view, a cone, and at light = mirrored view, where the
+        heightfield is smooth.
     Source: own; see `docs/heightfield.md` for what is tabulated.
     """
     name = "interpolated_gaussian_heightfield"

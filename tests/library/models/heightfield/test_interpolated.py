@@ -23,7 +23,9 @@ ALBEDOS = f64([0.15, 0.5, 0.95])
 def cosines(count, seed, low=0.0, high=85.0):
     """Directions of which the more grazing one is between two angles [degree]."""
     c = Cosines.of(
-        *random_directions(count, dtype=F64, max_angle=math.radians(high), generator=torch.Generator().manual_seed(seed))
+        *random_directions(
+            count, dtype=F64, max_angle=math.radians(high), generator=torch.Generator().manual_seed(seed)
+        )
     )
     inside = c.alpha < math.cos(math.radians(low))
     return Cosines.from_products(c.light[inside], c.view[inside], c.phase[inside])
