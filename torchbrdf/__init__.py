@@ -78,12 +78,14 @@ from torchbrdf.models.heightfield.interpolated import (
     InterpolatedGaussianHeightfield,
     interpolated_gaussian_heightfield,
 )
+from torchbrdf.models.heightfield.neighbours import NEIGHBOURING_FACETS, NeighbouringFacets
 from torchbrdf.models.heightfield.roughness import (
     rms_slope_from_beckmann_alpha,
     rms_slope_from_sigma,
     sigma_from_rms_slope,
 )
 from torchbrdf.models.heightfield.surface import GaussianHeightfield, gaussian_heightfield
+from torchbrdf.models.heightfield.transport import INDEPENDENT_FACETS
 from torchbrdf.models.heightfield.visibility import MESHED_HEIGHTFIELD, SMOOTH_HEIGHTFIELD, HeightfieldConstants
 from torchbrdf.models.lambert import (
     Lambert,
@@ -228,6 +230,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Hapke",
     "HeTorrance",
     "HeightfieldConstants",
+    "INDEPENDENT_FACETS",
     "ImageBRDF",
     "InterpolatedGaussianHeightfield",
     "InterpolatedRoughSurface",
@@ -243,6 +246,8 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Minnaert",
     "Mirror",
     "ModifiedPhong",
+    "NEIGHBOURING_FACETS",
+    "NeighbouringFacets",
     "Option",
     "OrenNayar",
     "Oriented",

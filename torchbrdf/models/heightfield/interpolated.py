@@ -15,6 +15,7 @@ from torchbrdf.interpolation.surface import InterpolatedSurface, interpolated
 from torchbrdf.models.heightfield.fast import FastGaussianHeightfield
 from torchbrdf.models.heightfield.surface import OCCLUSION, Settings, heightfield_fields
 from torchbrdf.models.heightfield.table import TableSize
+from torchbrdf.models.heightfield.transport import INDEPENDENT_FACETS
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD
 from torchbrdf.models.rungs import Member, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, kept
@@ -37,7 +38,7 @@ class HeightfieldTable(NamedTuple):
 
     @property
     def settings(self) -> Settings:
-        return Settings("all", self.nodes, TableSize(polar=14, orders=24), SMOOTH_HEIGHTFIELD)
+        return Settings("all", self.nodes, TableSize(polar=14, orders=24), SMOOTH_HEIGHTFIELD, INDEPENDENT_FACETS)
 
 
 def heightfield_reflectances(
