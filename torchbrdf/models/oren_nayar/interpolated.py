@@ -41,7 +41,7 @@ def interpolated_rough_surface(
     .. math:: f_r = \frac\rho\pi + \frac{\rho}{m} \sum_{r=1}^{R} U_r(x, v, z)\, c_r(\sigma, \rho)
 
     with m the mean cosine of light and view, and U, c cubic splines in coordinates of directions and material
-    (`torchbrdf.interpolation`). The table is built at the first call, in about 3 seconds of one core, and kept in
+    (`torchbrdf.interpolation`). The table is built at the first call, in about 4 seconds of one core, and kept in
     $TORCHBRDF_CACHE, else $XDG_CACHE_HOME/torchbrdf, else ~/.cache/torchbrdf.
 
     Args:
@@ -51,8 +51,8 @@ def interpolated_rough_surface(
         grid: sites of the table along each axis, and images R.
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
     Raises: ValueError when albedo or sigma leave their domains, for fewer than 6 sites or other than 1 to 25 images.
-    Deviations: from `torchbrdf.accuracy.converged`, sigma 2 to 60 deg, rho 0.1 to 0.95, in units of rho/pi: rms 9e-5
-        and at most 1e-3 where the more grazing direction is within 85 deg, 2e-4 and 4e-3 up to 89 deg, 9e-4 and 2e-2
+    Deviations: from `torchbrdf.accuracy.converged`, sigma 2 to 60 deg, rho 0.1 to 0.95, in units of rho/pi: rms 5e-5
+        and at most 1.5e-3 where the more grazing direction is within 85 deg, 2e-4 and 4e-3 up to 89 deg, 9e-4 and 2e-2
         up to 89.9 deg (`examples/benchmarks/interpolated_surfaces.py`); from 89.95 deg on held. White facets return 1
         within 1e-3. Has the subgradient 0 at the cones light = view and light = mirrored view.
     Source: of what is tabulated: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI
