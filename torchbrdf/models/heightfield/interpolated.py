@@ -101,9 +101,9 @@ def interpolated_gaussian_heightfield(
     Deviations: from the heightfield at 560 nodes, occlusion 1, sigma 2 to 60 deg, rho 0.1 to 0.95, in units of rho/pi:
         rms 2e-4 and at most 4e-3 (next to light = view at grazing) where the more grazing direction is within 85 deg,
         5e-4 and 4e-3 up to 89 deg, 4e-3 and 4e-2 up to 89.9 deg (`examples/benchmarks/interpolated_surfaces.py`); from
-        89.95 deg on held. Values may turn negative beyond 89 deg: to -0.02 up to 89.9 deg (sigma = 2 deg), to -4 (in
-        these units; the peak at light = view is some hundred) beyond. Has the subgradient 0 at light = view, a cone, and at light = mirrored view, where the
-        heightfield is smooth.
+        89.95 deg on held. Values may turn negative beyond 89 deg: to -0.02 in these units up to 89.9 deg (sigma = 2
+        deg), to -4 beyond, where the peak at light = view is some hundred. Has the subgradient 0 at light = view, a
+        cone, and at light = mirrored view, where the heightfield is smooth.
     Source: own; see `docs/heightfield.md` for what is tabulated.
     """
     name = "interpolated_gaussian_heightfield"

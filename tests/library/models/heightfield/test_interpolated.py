@@ -54,6 +54,22 @@ def test_the_default_table(degrees, low, high, typical, largest):
     assert error.abs().max() < largest
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("low", "high", "least"), [(0, 89, 0.0), (89, 89.9, -0.05), (89.9, 89.999, -5.0)])
+def test_how_far_the_default_table_turns_negative(low, high, least):
+    generator = torch.Generator().manual_seed(7)
+    alpha, share, dphi = torch.rand(3, 5000, dtype=F64, generator=generator)
+    alpha = torch.deg2rad(low + (high - low) * alpha)
+    beta = (alpha.cos() + (1 - alpha.cos()) * share).acos()
+    phase = alpha.cos() * beta.cos() + alpha.sin() * beta.sin() * (math.pi * dphi).cos()
+    c = Cosines.from_products(alpha.cos(), beta.cos(), phase)
+    for degrees in (0.5, 2, 10, 30, 60, 90):
+        f = interpolated_gaussian_heightfield(
+            c, albedo=ALBEDOS, sigma=f64(math.radians(degrees)).clamp(max=math.pi / 2)
+        )
+        assert (f * math.pi / ALBEDOS).min() >= least
+
+
 def test_module_and_function_agree():
     c, sigma = cosines(30, 5), f64(0.4)
     module = InterpolatedGaussianHeightfield(albedo=ALBEDOS, sigma=sigma, **COARSE)

@@ -60,6 +60,14 @@ def test_the_default_table_against_the_slow_reference(low, high, typical, larges
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("high", [85, 89.9, 89.999])
+def test_the_default_table_is_positive(high):
+    c, albedos = cosines(5000, 7, high - 5, high), f64([0.05, 0.5, 1.0])
+    for degrees in (0.5, 2, 10, 30, 60, 89):
+        assert (interpolated_rough_surface(c, albedo=albedos, sigma=f64(math.radians(degrees))) > 0).all()
+
+
+@pytest.mark.slow
 def test_white_furnace_of_the_default_table():
     angles = torch.linspace(0, 85, 18, dtype=F64).deg2rad()
     for degrees in (2, 10, 30, 60):
