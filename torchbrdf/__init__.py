@@ -14,6 +14,7 @@ import importlib
 import warnings
 
 from torchbrdf.brdf import BRDF, Option
+from torchbrdf.checks import unchecked
 from torchbrdf.directions import (
     Cosines,
     any_tangent,
@@ -313,6 +314,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "tabulated_weights",
     "torrance_sparrow",
     "trainable",
+    "unchecked",
     "v_cavities",
     "v_cavity_masking",
 ]
