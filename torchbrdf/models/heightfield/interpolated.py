@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf import effects
+from torchbrdf._constants import constant
 from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.interpolation.images import ImageTable, TableGrid, converted, image_table
@@ -66,7 +67,7 @@ def heightfield_table(key: HeightfieldTable) -> ImageTable:
     return image_table("heightfield", f"{key.occlusion!r}, {key.settings}", [Path(__file__).parent], sample, key.grid)
 
 
-@torch.compiler.assume_constant_result
+@constant
 def _table_in(key: HeightfieldTable, dtype: torch.dtype, device: torch.device) -> ImageTable:
     return converted(heightfield_table, key, dtype, device)
 

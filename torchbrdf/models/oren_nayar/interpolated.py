@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf import effects
+from torchbrdf._constants import constant
 from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.interpolation.images import ImageTable, TableGrid, converted, image_table
@@ -28,7 +29,7 @@ def rough_surface_table(grid: TableGrid) -> ImageTable:
     return image_table("rough-surface", f"{tuple(rule)}", [Path(__file__).parent], sample, grid)
 
 
-@torch.compiler.assume_constant_result
+@constant
 def _table_in(grid: TableGrid, dtype: torch.dtype, device: torch.device) -> ImageTable:
     return converted(rough_surface_table, grid, dtype, device)
 
