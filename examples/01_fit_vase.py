@@ -2,7 +2,8 @@
 
 The photographs are synthetic: sigma = 40 degrees and rho = 0.7, blurred (0.7 pixel), noisy (1 % of the peak)
 and quantised to 12 bits. They are made by the exact V-cavity model with all bounces (24 slopes), or by a random
-heightfield (`--truth heightfield`). Every kind of rung of the ladder is fitted to them.
+heightfield (`--truth heightfield`). Every kind of rung of the ladder is fitted to them; the exact model with all
+bounces through its table (`InterpolatedRoughSurface`), which is built at the first run and kept.
 """
 
 import argparse
@@ -19,7 +20,7 @@ from torchbrdf.accuracy import DIFFUSE_RUNGS, RUNGS, heightfield_reference
 SIGMA_DEGREES, ALBEDO = 40.0, 0.7
 FITTED = (
     "Lambert", "qualitative (0.33)", "functional", "closed form, K = 16", "fast, all bounces",
-    "exact, K = 16, 2 bounces", "exact, K = 16, all bounces", "fast heightfield",
+    "interpolated, all bounces", "exact, K = 16, 2 bounces", "fast heightfield",
 )  # fmt: skip
 
 
@@ -29,7 +30,7 @@ def grooves(albedo: torch.Tensor, sigma: torch.Tensor) -> RoughSurface:
 
 # By name: what makes the photographs, what it is called, and the rungs that the figure shows.
 TRUTHS = {
-    "grooves": (grooves, "the exact model with all bounces", ("Lambert", "exact, K = 16, all bounces")),
+    "grooves": (grooves, "the exact model with all bounces", ("Lambert", "interpolated, all bounces")),
     "heightfield": (heightfield_reference, "a random heightfield", ("Lambert", "fast heightfield")),
 }
 

@@ -1,5 +1,8 @@
 """What every test shares: one row of the catalog at a time, and seeded directions."""
 
+import os
+from pathlib import Path
+
 import pytest
 import torch
 from helpers.catalog import MODELS
@@ -9,6 +12,8 @@ from torchbrdf.testing import Directions, random_directions
 
 # The workers share the cores; threads of their own would wait for each other.
 torch.set_num_threads(1)
+# Nothing is written to the user's cache; another run of the same code finds its tables here.
+os.environ["TORCHBRDF_CACHE"] = str(Path(__file__).parents[1] / "build" / "tables")
 
 
 @pytest.fixture(params=MODELS, ids=lambda model: model.name)

@@ -45,6 +45,7 @@ from torchbrdf.fresnel import (
     f0_from_index,
     schlick,
 )
+from torchbrdf.interpolation.images import TableGrid
 from torchbrdf.linear import ImageBRDF, LinearBRDF
 from torchbrdf.mixture import WeightedSum
 from torchbrdf.models.ashikhmin_shirley import (
@@ -74,6 +75,10 @@ from torchbrdf.models.he_torrance.reflectance import (
 )
 from torchbrdf.models.heightfield.anisotropic import AnisotropicGaussianHeightfield, anisotropic_gaussian_heightfield
 from torchbrdf.models.heightfield.fast import FastGaussianHeightfield, fast_gaussian_heightfield
+from torchbrdf.models.heightfield.interpolated import (
+    InterpolatedGaussianHeightfield,
+    interpolated_gaussian_heightfield,
+)
 from torchbrdf.models.heightfield.neighbours import NEIGHBOURING_FACETS, NeighbouringFacets
 from torchbrdf.models.heightfield.roughness import (
     rms_slope_from_beckmann_alpha,
@@ -105,6 +110,10 @@ from torchbrdf.models.oren_nayar.fast import (
 from torchbrdf.models.oren_nayar.functional import (
     OrenNayar,
     oren_nayar,
+)
+from torchbrdf.models.oren_nayar.interpolated import (
+    InterpolatedRoughSurface,
+    interpolated_rough_surface,
 )
 from torchbrdf.models.oren_nayar.qualitative import (
     QualitativeOrenNayar,
@@ -224,6 +233,8 @@ __all__ = [  # noqa: RUF022 - in plain order
     "HeightfieldConstants",
     "INDEPENDENT_FACETS",
     "ImageBRDF",
+    "InterpolatedGaussianHeightfield",
+    "InterpolatedRoughSurface",
     "Interval",
     "Lambert",
     "LambertSphere",
@@ -253,6 +264,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "SellmeierIndex",
     "Simplex",
     "SingleSlopeVCavities",
+    "TableGrid",
     "TabulatedBRDF",
     "TabulatedRoughSurface",
     "TorranceSparrow",
@@ -276,6 +288,8 @@ __all__ = [  # noqa: RUF022 - in plain order
     "gaussian_weights",
     "he_torrance",
     "he_torrance_polarised",
+    "interpolated_gaussian_heightfield",
+    "interpolated_rough_surface",
     "is_per_texel",
     "lambert_sphere_fast",
     "minnaert",

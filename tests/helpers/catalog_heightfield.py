@@ -1,7 +1,14 @@
 """The rows of the random heightfields."""
 
+from helpers.coarse_tables import COARSE_HEIGHTFIELD
 from helpers.materials import Model, brushed, colour, number
-from torchbrdf import AnisotropicGaussianHeightfield, FastGaussianHeightfield, GaussianHeightfield, fixed
+from torchbrdf import (
+    AnisotropicGaussianHeightfield,
+    FastGaussianHeightfield,
+    GaussianHeightfield,
+    InterpolatedGaussianHeightfield,
+    fixed,
+)
 
 # The masking of two rays has a kink where they coincide, which no panel's end follows off the plane of the view.
 CONE = 5e-5
@@ -64,6 +71,14 @@ HEIGHTFIELD = [
         "fast gaussian heightfield, fixed sigma = 0",
         lambda dtype: FastGaussianHeightfield(albedo=colour(dtype), sigma=fixed(number(0.0, dtype))),
         captured=False,
+    ),
+    Model(
+        "interpolated gaussian heightfield",
+        lambda dtype: InterpolatedGaussianHeightfield(
+            albedo=colour(dtype), sigma=number(0.5, dtype), nodes=160, grid=COARSE_HEIGHTFIELD
+        ),
+        captured=False,
+        float32=ROUNDED,
     ),
     Model(
         "anisotropic gaussian heightfield",

@@ -17,6 +17,7 @@ from torchbrdf.accuracy.references import reference
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import PIXELS_AT_A_TIME, ImageBRDF, LinearBRDF
+from torchbrdf.models.oren_nayar.interpolated import InterpolatedRoughSurface
 from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
 from torchbrdf.models.oren_nayar.rough_surface import ClosedFormRoughSurface, RoughSurface
 
@@ -73,6 +74,10 @@ def _of_the_paper() -> tuple[Rung, ...]:
         "functional": (
             "closed form, K = 16",
             lambda albedo, sigma: ClosedFormRoughSurface(albedo=albedo, sigma=sigma),
+        ),
+        "fast, all bounces": (
+            "interpolated, all bounces",
+            lambda albedo, sigma: InterpolatedRoughSurface(albedo=albedo, sigma=sigma),
         ),
     }
     ladder: list[Rung] = []
