@@ -1,0 +1,89 @@
+"""When a model is evaluated by a compiled kernel, and the switch that decides it."""
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+import torch
+from torch import Tensor, nn
+from torch.autograd import forward_ad
+from torch.utils._python_dispatch import _get_current_dispatch_mode
+
+from torchbrdf._numerics import SUPPORTED_DTYPES
+from torchbrdf.brdf import BRDF
+from torchbrdf.kernels.forms import form_for
+from torchbrdf.kernels.machine import is_installed
+from torchbrdf.kernels.operator import reflectance
+from torchbrdf.kernels.pixel import stored
+
+# A kernel takes a fraction of a second to compile: what some hundred calls of this size take without it.
+SMALLEST = 4096
+_smallest: ContextVar[float] = ContextVar("smallest", default=SMALLEST)
+
+
+@contextmanager
+def native(smallest: float = 1) -> Iterator[None]:
+    """Compiled kernels within this context from `smallest` pixels on; `math.inf` for none.
+
+    Without it from 4096 pixels on, if `llvmlite` is installed. A context, since what is measured or debugged with one
+    choice is a part of a program and the other choice returns after it, whatever happens; it holds for one thread (and
+    asynchronous task) and does not disturb others.
+
+    >>> import torchbrdf
+    >>> with torchbrdf.native(math.inf):  # the formula alone
+    ...     pass
+    """
+    before = _smallest.set(smallest)
+    try:
+        yield
+    finally:
+        _smallest.reset(before)
+
+
+def by_kernel(model: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> Tensor | None:
+    """f_r (..., channel) [1/sr] by a compiled kernel, or None where the formula is to be used.
+
+    The formula is for whatever is not plain numbers on a CPU: traced, compiled or mapped tensors, forward
+    differentiation, other devices, dtypes that differ.
+    Raises: ValueError where a vector is not of unit length, as `Cosines.of`.
+    """
+    if torch.compiler.is_compiling() or _is_transformed():
+        return None
+    material = tuple(stored(model).values())
+    arrays = (normal, light, view, *material)
+    if not all(map(_is_plain, arrays)) or any(t.dtype != normal.dtype for t in arrays):
+        return None
+    if normal.dtype not in SUPPORTED_DTYPES or _pixels(arrays) < _smallest.get() or not is_installed():
+        return None
+    form = form_for(model)
+    if form is None or form.kernel(material, normal.dtype) is None:
+        return None
+    return reflectance(form.place, normal, light, view, material, checked=True)
+
+
+def _is_plain(tensor: object) -> bool:
+    """Whether it is an array of numbers in the computer's memory, and no subclass that stands for something else."""
+    if type(tensor) not in {Tensor, nn.Parameter}:
+        return False
+    return tensor.device.type == "cpu" and tensor.layout == torch.strided and not tensor.is_conj()
+
+
+def _is_transformed() -> bool:
+    """Whether operations are watched, mapped or differentiated forward: what happens to them is then not only here."""
+    return (
+        _get_current_dispatch_mode() is not None
+        or torch._C._functorch.peek_interpreter_stack() is not None
+        or forward_ad._current_level >= 0
+    )
+
+
+def _pixels(arrays: Sequence[Tensor]) -> int:
+    """Pixels of three vectors (..., 3); 0 where they are none, or what follows has pixels of its own that do not fit."""
+    vectors = arrays[:3]
+    if any(v.ndim == 0 or v.shape[-1] != 3 for v in vectors):
+        return 0
+    try:
+        return math.prod(torch.broadcast_shapes(*(v.shape[:-1] for v in vectors)))
+    except RuntimeError:
+        return 0
