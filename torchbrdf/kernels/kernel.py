@@ -90,6 +90,8 @@ class Kernel:
     def _run(
         self, loop: Compiled, rows: Sequence[Tensor], repeated: Sequence[bool], results: Sequence[Tensor], pixels: int
     ) -> int:
+        if pixels == 0:
+            return 0
         bytes_a_pixel = [0 if same else row.nbytes // pixels for row, same in zip(rows, repeated, strict=True)]
         bytes_a_pixel += [result.nbytes // pixels for result in results]
         starts = [array.data_ptr() for array in (*rows, *results)]

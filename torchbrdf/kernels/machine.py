@@ -2,10 +2,11 @@
 
 import ctypes
 import importlib
-import importlib.util
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
+
+_OLDEST_LLVM = (20, 0, 0)  # of llvmlite 0.45
 
 
 class Compiled(NamedTuple):
@@ -14,41 +15,53 @@ class Compiled(NamedTuple):
     Attributes:
         call: with the addresses of its arrays and the number of pixels; without Python's lock, so that threads do not
             wait for each other.
-        assembly: what it was compiled to.
         engine: owner of the code.
     """
 
     call: Callable[..., int]
-    assembly: str
     engine: Any
 
 
-def is_installed() -> bool:
-    """Whether the compiler is."""
-    return importlib.util.find_spec("llvmlite") is not None
-
-
 @cache
-def _target() -> tuple[Any, Any]:
-    llvm = importlib.import_module("llvmlite.binding")
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    target = llvm.Target.from_default_triple()
-    features = llvm.get_host_cpu_features().flatten()
-    return llvm, target.create_target_machine(cpu=llvm.get_host_cpu_name(), features=features, opt=3, jit=True)
+def is_installed() -> bool:
+    """Whether a compiler is that reads what `lowering` writes."""
+    try:
+        llvm = importlib.import_module("llvmlite.binding")
+    except ImportError:
+        return False
+    return tuple(llvm.llvm_version_info) >= _OLDEST_LLVM
 
 
 def compiled(text: str, arrays: int) -> Compiled:
     """The function `evaluate` of arrays and a number of pixels that a text defines."""
-    llvm, machine = _target()
-    module = llvm.parse_assembly(text)
-    module.triple, module.data_layout = machine.triple, str(machine.target_data)
-    options = llvm.create_pipeline_tuning_options(speed_level=3)
-    options.loop_vectorization = options.slp_vectorization = True
-    passes = llvm.create_pass_builder(machine, options)
-    passes.getModulePassManager().run(module, passes)
-    assembly = machine.emit_assembly(module)
-    engine = llvm.create_mcjit_compiler(module, _target.__wrapped__()[1])
+    llvm = importlib.import_module("llvmlite.binding")
+    engine = llvm.create_mcjit_compiler(_optimised(text), _processor())
     engine.finalize_object()
     kind = ctypes.CFUNCTYPE(ctypes.c_int32, *(ctypes.c_void_p,) * arrays, ctypes.c_int64)
-    return Compiled(kind(engine.get_function_address("evaluate")), assembly, engine)
+    return Compiled(kind(engine.get_function_address("evaluate")), engine)
+
+
+def assembly_of(text: str) -> str:
+    """What a text is compiled to, to be read."""
+    return _processor().emit_assembly(_optimised(text))
+
+
+def _optimised(text: str) -> Any:
+    llvm, processor = importlib.import_module("llvmlite.binding"), _processor()
+    module = llvm.parse_assembly(text)
+    module.triple, module.data_layout = processor.triple, str(processor.target_data)
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = True
+    passes = llvm.create_pass_builder(processor, options)
+    passes.getModulePassManager().run(module, passes)
+    return module
+
+
+def _processor() -> Any:
+    """The processor this runs on, with all its instructions; a new one each time, since an engine keeps it."""
+    llvm = importlib.import_module("llvmlite.binding")
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features = llvm.get_host_cpu_features().flatten()
+    target = llvm.Target.from_default_triple()
+    return target.create_target_machine(cpu=llvm.get_host_cpu_name(), features=features, opt=3, jit=True)

@@ -229,8 +229,17 @@ def _copied(_: Program, target: np.ndarray, source: np.ndarray, *__: Any) -> np.
     return np.broadcast_to(source, target.shape)
 
 
+def _placed(p: Program, part: np.ndarray, size: Sequence[int], dim: int, index: int | slice) -> np.ndarray:
+    whole = np.full(tuple(size), p.constant(0.0), dtype=object)
+    np.moveaxis(whole, dim, 0)[index] = part if isinstance(index, int) else np.moveaxis(part, dim, 0)
+    return whole
+
+
 # Operations whose results depend on the shape of what they are given alone.
-LIKE = {"ones_like", "zeros_like", "full_like", "new_zeros", "new_ones", "new_full", "empty_like", "new_empty"}
+LIKE = {
+    *("ones_like", "zeros_like", "full_like", "empty_like"),
+    *("new_zeros", "new_ones", "new_full", "new_empty", "new_empty_strided"),
+}
 RESHAPED_IN_PLACE = {"squeeze_", "unsqueeze_", "t_", "transpose_"}
 # Operations on whole arrays of places.
 WHOLE: dict[str, Callable[..., np.ndarray]] = {
@@ -240,6 +249,9 @@ WHOLE: dict[str, Callable[..., np.ndarray]] = {
     "mm": _product,
     "addmm": _affine,
     "copy": _copied,
+    "flip": lambda p, x, dims: np.flip(x, dims),
+    "select_backward": lambda p, g, size, dim, index: _placed(p, g, size, dim, index),
+    "slice_backward": lambda p, g, size, dim, start, end, step: _placed(p, g, size, dim, slice(start, end, step)),
 }
 # Operations on one number of each argument; a bool in memory is a truth value in the program.
 ELEMENTWISE: dict[str, Rule] = {

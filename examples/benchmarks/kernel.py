@@ -1,0 +1,145 @@
+"""Compiled kernels against the formula they come from and against the code that people write by hand.
+
+    OMP_NUM_THREADS=1 python examples/benchmarks/kernel.py [--pixels 1048576] [--repeats 15]
+
+Needs `pip install torchbrdf[fast]`. Float32, one thread unless stated, per-texel roughness and RGB albedo, which alone
+have gradients unless stated. Calls take turns, so that a slower minute slows them all; the shortest time counts.
+"""
+
+import argparse
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import torch
+from naive import naive_oren_nayar
+from torch import Tensor
+
+from torchbrdf import EON, FastRoughSurface, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar, native
+
+FIRST_CALL = 4096  # pixels of the call that compiles
+
+
+class Inputs:
+    """Directions and a material, per texel or one for all."""
+
+    def __init__(self, pixels: int):
+        g = torch.Generator().manual_seed(0)
+        normal = torch.tensor([0.0, 0.0, 1.0]).expand(pixels, 3).contiguous()
+        up = [torch.randn(pixels, 3, generator=g).abs() + 0.01 for _ in range(2)]
+        light, view = (torch.nn.functional.normalize(v, dim=-1) for v in up)
+        self.vectors = (normal, light, view)
+        self.rough = 0.1 + 0.7 * torch.rand(pixels, generator=g)
+        self.albedo = 0.1 + 0.8 * torch.rand(pixels, 3, generator=g)
+
+
+def models_of(x: Inputs) -> dict[str, Callable[..., Tensor]]:
+    """By name: models per texel, and the code by hand with the same gradients."""
+    by_hand = x.rough.clone().requires_grad_(), x.albedo.clone().requires_grad_()
+    return {
+        "by hand": lambda *vectors: naive_oren_nayar(*vectors, *by_hand),
+        "OrenNayar": OrenNayar(albedo=x.albedo, sigma=x.rough),
+        "QualitativeOrenNayar": QualitativeOrenNayar(albedo=x.albedo, sigma=x.rough),
+        "FujiiOrenNayar": FujiiOrenNayar(albedo=x.albedo, roughness=x.rough),
+        "EON": EON(albedo=x.albedo, roughness=x.rough),
+        "FastRoughSurface, 2 bounces": FastRoughSurface(albedo=x.albedo, sigma=x.rough, bounces=2),
+    }
+
+
+def shortest(calls: dict[str, Callable[[], object]], repeats: int) -> dict[str, float]:
+    """Seconds of the quickest of some calls of each, which take turns."""
+    best = dict.fromkeys(calls, math.inf)
+    for _ in range(repeats):
+        for name, call in calls.items():
+            began = time.perf_counter()
+            call()
+            best[name] = min(best[name], time.perf_counter() - began)
+    return best
+
+
+def forward_of(model: Callable[..., Tensor], vectors: Sequence[Tensor], *, smallest: float) -> Callable[[], object]:
+    def call() -> None:
+        with torch.no_grad(), native(smallest):
+            model(*vectors)
+
+    return call
+
+
+def both_of(model: Callable[..., Tensor], vectors: Sequence[Tensor], *, smallest: float) -> Callable[[], object]:
+    def call() -> None:
+        with native(smallest):
+            model(*vectors).sum().backward()
+
+    return call
+
+
+def table(pixels: int, repeats: int) -> None:
+    """Speed relative to the code by hand."""
+    x = Inputs(pixels)
+    models = models_of(x)
+    forward = {name: forward_of(m, x.vectors, smallest=1) for name, m in models.items()}
+    both = {name: both_of(m, x.vectors, smallest=1) for name, m in models.items()}
+    moving = [v.clone().requires_grad_() for v in x.vectors]
+    both["OrenNayar, vectors too"] = both_of(models["OrenNayar"], moving, smallest=1)
+    both["by hand, vectors too"] = both_of(models["by hand"], moving, smallest=1)
+    formula = {f"{name}, formula": both_of(models[name], x.vectors, smallest=math.inf) for name in ("OrenNayar", "EON")}
+    streams = torch.empty(26 * pixels // 2), torch.empty(26 * pixels // 2)
+    calls = {(name, False): call for name, call in forward.items()} | {
+        (name, True): call for name, call in (both | formula).items()
+    }
+    calls["copy", True] = lambda: streams[1].copy_(streams[0])
+    spent = shortest(calls, repeats)
+    print(f"{pixels} pixels; speed relative to the code by hand, and nanoseconds a pixel\n")
+    print("| model | forward | forward + backward | ns | ns |")
+    print("|---|---|---|---|---|")
+    for name in (*both, *formula, "copy"):
+        pair = [spent.get((name, backward)) for backward in (False, True)]
+        ratios = [f"{spent['by hand', k] / t:.1f} x" if t else "" for k, t in zip((False, True), pair, strict=True)]
+        ns = [f"{1e9 * t / pixels:.1f}" if t else "" for t in pair]
+        print(f"| {name} | {' | '.join(ratios)} | {' | '.join(ns)} |")
+
+
+def sizes(repeats: int) -> None:
+    """One call from one direction to a million."""
+    print("\n| pixels | by hand | formula | kernel |  (microseconds of OrenNayar forward)")
+    print("|---|---|---|---|")
+    for pixels in (1, 100, 10_000, 1_000_000):
+        x = Inputs(pixels)
+        model, by_hand = OrenNayar(albedo=x.albedo, sigma=x.rough), models_of(x)["by hand"]
+        calls = {
+            "by hand": forward_of(by_hand, x.vectors, smallest=1),
+            "formula": forward_of(model, x.vectors, smallest=math.inf),
+            "kernel": forward_of(model, x.vectors, smallest=1),
+        }
+        spent = shortest(calls, repeats if pixels > 10_000 else 20 * repeats)
+        print(f"| {pixels} | " + " | ".join(f"{1e6 * spent[name]:.0f}" for name in calls) + " |")
+
+
+def first_calls() -> None:
+    """Seconds until a model's first answer, and its first derivatives, are there."""
+    x = Inputs(FIRST_CALL)
+    print("\n| first call | forward | backward |  (seconds, recording and compiling)")
+    print("|---|---|---|")
+    for name, model in models_of(x).items():
+        if name == "by hand":
+            continue
+        began = time.perf_counter()
+        value = model(*x.vectors)
+        middle = time.perf_counter()
+        value.sum().backward()
+        print(f"| {name} | {middle - began:.2f} | {time.perf_counter() - middle:.2f} |")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--pixels", type=int, default=1 << 20)
+    parser.add_argument("--repeats", type=int, default=15)
+    options = parser.parse_args()
+    torch.set_num_threads(1)
+    first_calls()
+    table(options.pixels, options.repeats)
+    sizes(options.repeats)
+
+
+if __name__ == "__main__":
+    main()
