@@ -229,10 +229,21 @@ def _copied(_: Program, target: np.ndarray, source: np.ndarray, *__: Any) -> np.
     return np.broadcast_to(source, target.shape)
 
 
-def _placed(p: Program, part: np.ndarray, size: Sequence[int], dim: int, index: int | slice) -> np.ndarray:
+def _placed(p: Program, part: np.ndarray, size: Sequence[int], dim: int, rows: slice) -> np.ndarray:
     whole = np.full(tuple(size), p.constant(0.0), dtype=object)
-    np.moveaxis(whole, dim, 0)[index] = part if isinstance(index, int) else np.moveaxis(part, dim, 0)
+    np.moveaxis(whole, dim, 0)[rows] = np.moveaxis(part, dim, 0)
     return whole
+
+
+def _selected(p: Program, part: np.ndarray, size: Sequence[int], dim: int, index: int) -> np.ndarray:
+    first = index % size[dim]
+    return _placed(p, np.expand_dims(part, dim), size, dim, slice(first, first + 1))
+
+
+def _sliced(
+    p: Program, part: np.ndarray, size: Sequence[int], dim: int, start: int, end: int, step: int
+) -> np.ndarray:
+    return _placed(p, part, size, dim, slice(start, end, step))
 
 
 # Operations whose results depend on the shape of what they are given alone.
@@ -250,8 +261,8 @@ WHOLE: dict[str, Callable[..., np.ndarray]] = {
     "addmm": _affine,
     "copy": _copied,
     "flip": lambda p, x, dims: np.flip(x, dims),
-    "select_backward": lambda p, g, size, dim, index: _placed(p, g, size, dim, index),
-    "slice_backward": lambda p, g, size, dim, start, end, step: _placed(p, g, size, dim, slice(start, end, step)),
+    "select_backward": _selected,
+    "slice_backward": _sliced,
 }
 # Operations on one number of each argument; a bool in memory is a truth value in the program.
 ELEMENTWISE: dict[str, Rule] = {
@@ -279,8 +290,9 @@ ELEMENTWISE: dict[str, Rule] = {
     "threshold_backward": lambda p, g, x, t: p.select(p.append("gt", x, t), g, p.constant(0.0)),
     "where": Program.select,
     "masked_fill": lambda p, x, mask, value: p.select(mask, value, x),
-    "bitwise_not": lambda p, x: p.append("not", x),
-    "bitwise_and": lambda p, a, b: p.append("and", a, b),
+    **{f"{kind}_not": lambda p, x: p.append("not", x) for kind in ("bitwise", "logical")},
+    **{f"{kind}_and": lambda p, a, b: p.append("and", a, b) for kind in ("bitwise", "logical")},
+    **{f"{kind}_or": lambda p, a, b: p.append("or", a, b) for kind in ("bitwise", "logical")},
     "clone": lambda p, x: x,
     "_to_copy": _number,
     "fill": lambda p, x, value: value,
