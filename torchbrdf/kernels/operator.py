@@ -91,7 +91,7 @@ def _backward(ctx: Any, weight: Tensor) -> tuple[Any, ...]:
     return None, *slopes[:3], slopes[3:], None
 
 
-def _without_numbers(
+def _unlooked_at(
     form: int, normal: Tensor, light: Tensor, view: Tensor, material: Sequence[Tensor], checked: bool
 ) -> Tensor:
     return form_at(form).formula(normal, light, view, material)
@@ -110,18 +110,13 @@ def _slopes_without_numbers(
     return [torch.empty_like(t) if want else normal.new_empty(0) for t, want in zip(arrays, wanted, strict=True)]
 
 
-def _mapped(info: Any, in_dims: tuple[Any, ...], form: int, *inputs: Any) -> tuple[Tensor, int]:
-    *arrays, _ = inputs
-    return torch.vmap(lambda *given: form_at(form).formula(*given), in_dims[1:5])(*arrays), 0
-
-
 _library.impl("reflectance", _value, "CPU")
 _library.impl("reflectance", _formula, "CUDA")
+_library.impl("reflectance", _unlooked_at, "FuncTorchBatched")
 _library.impl("reflectance_slopes", _slopes, "CompositeExplicitAutograd")
-torch.library.register_fake(_VALUE, _without_numbers, lib=_library)
+torch.library.register_fake(_VALUE, _unlooked_at, lib=_library)
 torch.library.register_fake(_SLOPES, _slopes_without_numbers, lib=_library)
 torch.library.register_autograd(_VALUE, _backward, setup_context=_keep, lib=_library)
-torch.library.register_vmap(_VALUE, _mapped, lib=_library)
 
 
 def reflectance(

@@ -76,7 +76,7 @@ class Recorder(TorchDispatchMode):
             for t in outputs:  # numbers that depend on no input
                 self._write(t, self._numbers(t))
         else:
-            if outputs[0].dtype not in {self.dtype, torch.bool}:
+            if outputs[0].dtype != (torch.bool if name in TRUTHFUL else self.dtype):
                 raise CannotRecord(f"{name} makes {outputs[0].dtype}")
             self._write(outputs[0], self._evaluate(name, args, kwargs, self._read))
         return made
@@ -101,6 +101,8 @@ class Recorder(TorchDispatchMode):
         shape = arrays[0].shape
         places = iter(arrays)
         rows = [[None] * arrays[0].size if x is None else list(next(places).ravel()) for x in arguments]
+        if name not in {*TRUTHFUL, "where", "masked_fill"}:
+            rows = [[x if x is None else _number(self.program, x) for x in row] for row in rows]
         written = [rule(self.program, *row, **options) for row in zip(*rows, strict=True)]
         return np.array(written, dtype=object).reshape(shape)
 
@@ -201,10 +203,6 @@ def _number(p: Program, x: int) -> int:
     return p.select(x, p.constant(1.0), p.constant(0.0)) if p.is_truth(x) else x
 
 
-def _product_of(p: Program, a: int, b: int) -> int:
-    return p.multiply(_number(p, a), _number(p, b))
-
-
 def _sum(p: Program, x: np.ndarray, dims: Sequence[int] | None = None, keepdim: bool = False, **_: Any) -> np.ndarray:
     axes = range(x.ndim) if not dims else [d % x.ndim for d in dims]
     for axis in sorted(axes, reverse=True):
@@ -264,12 +262,15 @@ WHOLE: dict[str, Callable[..., np.ndarray]] = {
     "select_backward": _selected,
     "slice_backward": _sliced,
 }
+LOGIC = {f"{kind}_{name}": name for kind in ("bitwise", "logical") for name in ("and", "or", "not")}
+# Operations that make truths.
+TRUTHFUL = {*LOGIC, *COMPARISONS}
 # Operations on one number of each argument; a bool in memory is a truth value in the program.
 ELEMENTWISE: dict[str, Rule] = {
     "add": lambda p, a, b, alpha=None: p.add(a, _scaled(p, b, alpha)),
     "sub": lambda p, a, b, alpha=None: p.subtract(a, _scaled(p, b, alpha)),
     "rsub": lambda p, a, b, alpha=None: p.subtract(b, _scaled(p, a, alpha)),
-    "mul": _product_of,
+    "mul": Program.multiply,
     "div": Program.divide,
     "neg": Program.negate,
     "abs": lambda p, x: p.append("abs", x),
@@ -290,12 +291,10 @@ ELEMENTWISE: dict[str, Rule] = {
     "threshold_backward": lambda p, g, x, t: p.select(p.append("gt", x, t), g, p.constant(0.0)),
     "where": Program.select,
     "masked_fill": lambda p, x, mask, value: p.select(mask, value, x),
-    **{f"{kind}_not": lambda p, x: p.append("not", x) for kind in ("bitwise", "logical")},
-    **{f"{kind}_and": lambda p, a, b: p.append("and", a, b) for kind in ("bitwise", "logical")},
-    **{f"{kind}_or": lambda p, a, b: p.append("or", a, b) for kind in ("bitwise", "logical")},
     "clone": lambda p, x: x,
-    "_to_copy": _number,
+    "_to_copy": lambda p, x: x,
     "fill": lambda p, x, value: value,
     "zero": lambda p, x: p.constant(0.0),
-    **{name: (lambda p, a, b, name=name: p.append(name, a, b)) for name in COMPARISONS},
+    **{name: (lambda p, a, b, name=name: p.append(name, _number(p, a), _number(p, b))) for name in COMPARISONS},
+    **{name: (lambda p, *x, step=step: p.append(step, *x)) for name, step in LOGIC.items()},
 }

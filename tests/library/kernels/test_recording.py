@@ -94,3 +94,13 @@ def test_ties_take_torchs_side(tie):
 def test_refuses_what_it_cannot_write_down(function):
     with pytest.raises(CannotRecord):
         recorded(function, (3,))
+
+
+def test_a_choice_between_truths_is_refused():
+    with pytest.raises(CannotRecord):
+        recorded(lambda x: x * torch.where(x > 1, x > 2, x > 0), (3,))
+
+
+def test_truths_are_numbers_where_they_are_computed_with():
+    program, values, _ = recorded(lambda x: (x > 0) * x + 2.0 * (x > 1).double() - ((x > 0) == (x > 1)) * x, (3,))
+    assert evaluated(program, values, (-1.0, 0.5, 2.0)).tolist() == [1.0, 0.5, 2.0]
