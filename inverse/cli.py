@@ -2,16 +2,18 @@
 
 import argparse
 import json
+import logging
 import math
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from inverse.files import read_stack, write_stack
+from inverse.files import MAX_PIXELS, read_stack, write_stack
 from inverse.fitting import FitError, bootstrap, fit, usable
 from inverse.scene import Distant, Scene, Sensor, cylinder, plane, sphere, vase
 from inverse.transport import render
@@ -22,16 +24,56 @@ _EXPOSURE = "image value per unit radiance; with pi, white that faces a light of
 _SHAPES = {"vase": vase, "sphere": sphere, "cylinder": cylinder, "plane": plane}
 
 
+# What a scene of the command line takes at its peak, measured with all shapes, and what each image adds.
+_BYTES_A_PIXEL, _BYTES_AN_IMAGE_PIXEL = 950, 16
+_STEP = tuple[dict[str, Any], str]
+_INTERRUPTED = 130
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; 0 on success, 2 on bad input with one line on stderr."""
+    """Run one command; 0 on success, otherwise one line on stderr and 2, or 130 after an interrupt.
+
+    What was finished by then is printed in any case.
+    """
     options = _parser().parse_args(arguments)
+    logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # what it logs comes as an error as well
+    finished: dict[str, Any] = {}
+    trouble, code = "", 0
     try:
-        report = options.run(options)
+        for report, text in options.run(options):
+            finished |= report
+            if not options.json:
+                _print(text)
     except (ValueError, OSError, FitError) as error:
-        print("error:", " ".join(str(error).split()), file=sys.stderr)
-        return 2
-    print(json.dumps(report, indent=2, allow_nan=False) if options.json else report["table"])
-    return 0
+        trouble, code = str(error), 2
+    except KeyboardInterrupt:
+        trouble, code = "interrupted" + ("; what is printed was finished" if finished else ""), _INTERRUPTED
+    except (MemoryError, RuntimeError) as error:
+        if not _out_of_memory(error):
+            raise
+        trouble, code = "out of memory: smaller or fewer images may fit", 2
+    if options.json and finished:
+        try:
+            _print(json.dumps(finished, indent=2, allow_nan=False))
+        except OSError as error:
+            trouble, code = trouble or str(error), code or 2
+    if trouble:
+        print("error:", " ".join(trouble.split()), file=sys.stderr)
+    return code
+
+
+def _print(text: str) -> None:
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        # what is still in the buffer goes nowhere: the interpreter would try again at its end, and complain
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise OSError(f"standard output: {error}") from error
+
+
+def _out_of_memory(error: Exception) -> bool:
+    # torch raises a plain RuntimeError for memory of the processor
+    return isinstance(error, (MemoryError, torch.OutOfMemoryError)) or "allocate memory" in str(error)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -47,6 +89,27 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"must be finite; found {text!r}")
+    return value
+
+
+def _seed(text: str) -> int:
+    value = int(text)
+    if not 0 <= value < 2**63:
+        raise argparse.ArgumentTypeError(f"must lie in [0, 2^63); found {text!r}")
+    return value
+
+
+def _samples(text: str) -> int:
+    value = int(text)
+    if value < 2 and value != 0:
+        raise argparse.ArgumentTypeError(f"must be at least 2, or 0 for none; found {text!r}")
+    return value
+
+
 def _add_fit(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_fit)
     add = parser.add_argument
@@ -58,15 +121,16 @@ def _add_fit(parser: argparse.ArgumentParser) -> None:
     add("--mask", metavar="FILE", help="instead of the image with mask in its name")
     add("--lights", metavar="FILE", help="instead of lights.txt")
     add("--srgb", action="store_true", help="the images are sRGB-encoded, not linear")
-    add("--limb", type=float, default=70.0, help="leave out points seen at more than this [deg] (%(default)s)")
-    add("--highlight", type=float, default=0.0, help="leave out points this close to mirroring the light [deg]")
-    add("--shadow", type=float, default=80.0, help="leave out points lit at more than this [deg] (%(default)s)")
-    add("--exposure", type=float, help=f"{_EXPOSURE} (that of the folder's stack.json; pi where it has none)")
+    add("--limb", type=_number, default=70.0, help="leave out points seen at more than this [deg] (%(default)s)")
+    add("--highlight", type=_number, default=0.0, help="leave out points this close to mirroring the light [deg]")
+    add("--shadow", type=_number, default=80.0, help="leave out points lit at more than this [deg] (%(default)s)")
+    add("--exposure", type=_number, help=f"{_EXPOSURE} (that of the folder's stack.json; pi where it has none)")
     add("--free-exposure", action="store_true", help="fit the exposure of each image after the first")
     add("--free-ambient", action="store_true", help="fit a constant added to each image")
     add("--starts", type=int, default=1, help="number of starting points (%(default)s)")
-    add("--bootstrap", type=int, default=0, metavar="N", help="refit to N samples of the images for error bars")
-    add("--seed", type=int, default=0, help="of random starts and bootstrap (%(default)s)")
+    add("--bootstrap", type=_samples, default=0, metavar="N", help="refit to N samples of the images for error bars")
+    add("--max-megapixels", type=_number, default=MAX_PIXELS / 1e6, help="refuse larger images (%(default)s)")
+    add("--seed", type=_seed, default=0, help="of random starts and bootstrap (%(default)s)")
     add("--json", action="store_true", help="print JSON")
 
 
@@ -76,22 +140,23 @@ def _add_render(parser: argparse.ArgumentParser) -> None:
     add("--output", required=True, metavar="FOLDER", help="where to write 16-bit images and what `fit` needs")
     add("--geometry", choices=list(_SHAPES), default="vase")
     add("--model", choices=["lambert", *_ROUGH], default="oren-nayar")
-    add("--sigma", type=float, default=40.0, metavar="DEG", help="roughness [deg] (%(default)s)")
-    add("--albedo", type=float, default=0.7, help="facet albedo (%(default)s)")
-    add("--lights-deg", type=float, nargs="+", default=[0.0, 20.0], metavar="DEG",
+    add("--sigma", type=_number, default=40.0, metavar="DEG", help="roughness [deg] (%(default)s)")
+    add("--albedo", type=_number, default=0.7, help="facet albedo (%(default)s)")
+    add("--lights-deg", type=_number, nargs="+", default=[0.0, 20.0], metavar="DEG",
         help="a light an image, this far to the right of the camera [deg] (0 20)")  # fmt: skip
     add("--size", type=int, default=256, help="rows and columns (%(default)s)")
-    add("--noise", type=float, default=0.0, help="standard deviation, share of full scale (%(default)s)")
-    add("--seed", type=int, default=0, help="of the noise (%(default)s)")
-    add("--exposure", type=float, default=math.pi, help=f"{_EXPOSURE} (pi)")
+    add("--noise", type=_number, default=0.0, help="standard deviation, share of full scale (%(default)s)")
+    add("--seed", type=_seed, default=0, help="of the noise (%(default)s)")
+    add("--exposure", type=_number, default=math.pi, help=f"{_EXPOSURE} (pi)")
     add("--overwrite", action="store_true", help="replace an older stack in the output folder")
     add("--json", action="store_true", help="print JSON")
 
 
-def _fit(options: argparse.Namespace) -> dict[str, Any]:
+def _fit(options: argparse.Namespace) -> Iterator[_STEP]:
     photos = read_stack(
         options.folder, images=options.images, mask=options.mask, lights=options.lights, geometry=options.geometry,
         color="srgb" if options.srgb else "linear", dtype=torch.float64,
+        max_pixels=round(options.max_megapixels * 1e6),
     )  # fmt: skip
     scene = photos.scene
     if options.exposure is not None or not photos.sensor_stated:
@@ -107,23 +172,22 @@ def _fit(options: argparse.Namespace) -> dict[str, Any]:
         "starts": options.starts,
     }  # fmt: skip
     result = fit(scene, photos.images, model, seed=options.seed, **how)
-    report = {"images": list(photos.names), **result.to_json()}
-    table = [str(result)]
+    yield {"images": list(photos.names), **result.to_json()}, str(result)
     if options.bootstrap:
         spread = bootstrap(scene, photos.images, model, samples=options.bootstrap, seed=options.seed, **how)
-        report["bootstrap"] = {"samples": options.bootstrap}
+        report: dict[str, Any] = {"samples": options.bootstrap}
+        lines = []
         for name, value in spread.items():
             angle = name in result.angles
             label, shown = (f"{name}_degrees", torch.rad2deg(value)) if angle else (name, value)
-            report["bootstrap"][label] = _plain(shown)
+            report[label] = _plain(shown)
             numbers = ", ".join(f"{k:.2g}" for k in shown.flatten().tolist())
-            table.append(f"{'bootstrap':<14}{name} +- {numbers}{' deg' if angle else ''}, {options.bootstrap} refits")
-    return report if options.json else {"table": "\n".join(table)}
+            lines.append(f"{'bootstrap':<14}{name} +- {numbers}{' deg' if angle else ''}, {options.bootstrap} refits")
+        yield {"bootstrap": report}, "\n".join(lines)
 
 
-def _render(options: argparse.Namespace) -> dict[str, Any]:
-    if not math.isfinite(options.albedo) or not math.isfinite(options.sigma):
-        raise ValueError(f"albedo and sigma must be finite; found {options.albedo} and {options.sigma}.")
+def _render(options: argparse.Namespace) -> Iterator[_STEP]:
+    _check_memory(options.size, len(options.lights_deg))
     surface = _SHAPES[options.geometry](options.size, options.size, dtype=torch.float64)
     sensor = Sensor(exposure=options.exposure, read_noise=options.noise)
     scene = Scene(surface, [Distant.from_angle(angle) for angle in options.lights_deg], sensor)
@@ -134,7 +198,21 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
     write_stack(options.output, images, scene, overwrite=options.overwrite)
     report = {"folder": options.output, "images": len(images), "rows": options.size, "columns": options.size}
     report |= {"clipped": (images >= 1).double().mean().item()}
-    return report | {"table": f"{len(images)} images of {options.size} x {options.size} pixels in {options.output}"}
+    yield report, f"{len(images)} images of {options.size} x {options.size} pixels in {options.output}"
+
+
+def _check_memory(size: int, images: int) -> None:
+    """ValueError for pictures that this machine cannot hold, before it tries."""
+    needed = size * size * (_BYTES_A_PIXEL + images * _BYTES_AN_IMAGE_PIXEL)
+    try:
+        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # not every system says
+        return
+    if needed > there:
+        raise ValueError(
+            f"{images} images of {size} x {size} pixels need about {needed / 2**30:.3g} GiB of memory; "
+            f"this machine has {there / 2**30:.3g}."
+        )
 
 
 def _model(name: str, albedo: Tensor | fixed, sigma: Tensor | fixed) -> BRDF:

@@ -10,7 +10,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from inverse.files.images import read_image
+from inverse.files.images import image_size, read_image
+from inverse.files.regular import read_text, shortened, size_of
 from inverse.scene import (
     Distant,
     Light,
@@ -45,14 +46,14 @@ class StackFile:
         if not path.is_file():
             return cls()
         try:
-            content = json.loads(path.read_text())
+            content = json.loads(read_text(path))
             if not isinstance(content, dict) or not set(content) <= {"sensor", "lights"}:
                 raise ValueError('must be {"sensor": {...}, "lights": {"IMAGE": [{...}, ...], ...}}, each optional')
             sensor = Sensor(**content["sensor"]) if "sensor" in content else None
             if "lights" not in content:
                 return cls(sensor)
             return cls(sensor, {name: _of_numbers(name, lights) for name, lights in content["lights"].items()})
-        except (ValueError, TypeError, AttributeError) as error:  # of the values, of their names, of a list for a table
+        except (ValueError, TypeError, AttributeError, RecursionError) as error:  # of values, names, kinds, nesting
             raise ValueError(f"{path}: {error}") from error
 
 
@@ -65,12 +66,15 @@ def stack_text(sensor: Sensor, lights: dict[str, list[StoredLight]]) -> str:
     return json.dumps({"sensor": asdict(sensor), "lights": numbers}, indent=1, allow_nan=False) + "\n"
 
 
-def text_lights(path: Path) -> list[Distant]:
-    """The lights of lights.txt, one an image."""
+def text_lights(path: Path, images: int) -> list[Distant]:
+    """The lights of lights.txt, one for each of so many images."""
     lines, lights = text_lines(path), []
-    count = int(lines.pop(0)[1]) if lines and lines[0][1].isdecimal() else len(lines)
-    if count != len(lines):
-        raise ValueError(f"{path}: the first line announces {count} lights; found {len(lines)}.")
+    if lines and lines[0][1].isdecimal():
+        announced = lines.pop(0)[1]
+        if announced.lstrip("0") != str(len(lines)).lstrip("0"):
+            raise ValueError(f"{path}: the first line announces {announced[:20]} lights; found {len(lines)}.")
+    if len(lines) != images:
+        raise ValueError(f"{path}: one light an image; found {len(lines)} lights and {images} images.")
     for number, line in lines:
         values = _floats(line.split())
         length = math.hypot(*values[:3])
@@ -78,7 +82,7 @@ def text_lights(path: Path) -> list[Distant]:
         strength = values[3:] or [1.0]
         if not right or min(strength) < 0 or max(strength) == 0:
             rule = "a light is x y z of length 1, then its irradiance > 0 if not 1, or red, green and blue"
-            raise ValueError(f"{path}, line {number}: {rule}; found {line!r} (length {length:.4g}).")
+            raise ValueError(f"{path}, line {number}: {rule}; found {shortened(line)} (length {length:.4g}).")
         direction = torch.tensor(values[:3], dtype=torch.float64)
         irradiance = strength[0] if len(strength) == 1 else torch.tensor(strength, dtype=torch.float64)
         lights.append(Distant(direction, irradiance))
@@ -92,7 +96,7 @@ def text_surface(line: str, folder: Path, shape: tuple[int, int], dtype: torch.d
     known = ("sphere", 3, 3), *(("normals", k, 0) for k in (1, 2, 3)), ("depth", 1, 0), ("depth", 5, 4)
     if (kind, len(rest), len(numbers)) not in known or (kind == "sphere" and numbers[2] <= 0):
         rule = 'the geometry is "sphere cx cy r" with r > 0, "normals FILE" or "depth FILE [fx fy cx cy]"'
-        raise ValueError(f"{folder}: {rule}; found {line!r}.")
+        raise ValueError(f"{folder}: {rule}; found {shortened(line)}.")
     try:
         if kind == "sphere":
             pitch = 2 / shape[0]
@@ -106,19 +110,19 @@ def text_surface(line: str, folder: Path, shape: tuple[int, int], dtype: torch.d
         fx, fy, cx, cy = numbers
         return from_depth(depth, torch.tensor([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], dtype=dtype))
     except Exception as error:  # NumPy raises EOFError, ValueError, TypeError and others
-        raise ValueError(f"{folder}: geometry {line!r}: {error}") from error
+        raise ValueError(f"{folder}: geometry {shortened(line)}: {error}") from error
 
 
 def text_lines(path: Path) -> list[tuple[int, str]]:
     """Numbered lines with something on them, comments removed."""
-    stripped = [line.split("#")[0].strip() for line in path.read_text(errors="replace").splitlines()]
+    stripped = [line.split("#")[0].strip() for line in read_text(path).splitlines()]
     return [(number, line) for number, line in enumerate(stripped, 1) if line]
 
 
-def check_shape(path: Path, array: Tensor, shape: tuple[int, ...]) -> None:
-    """ValueError for an array of another shape than the stack's."""
-    if array.shape != shape:
-        raise ValueError(f"{path}: must be {tuple(shape)}, as the stack's first image; found {tuple(array.shape)}.")
+def check_shape(path: Path, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    """ValueError for another shape than the stack's."""
+    if tuple(shape) != tuple(expected):
+        raise ValueError(f"{path}: must be {tuple(expected)}, as the stack's first image; found {tuple(shape)}.")
 
 
 def _of_numbers(name: str, lights: list[dict[str, Any]]) -> tuple[Light, ...]:
@@ -150,11 +154,15 @@ def _floats(words: list[str]) -> list[float]:
 def _map(path: Path, shape: tuple[int, ...]) -> Tensor:
     """Array of a .npy file, or normals from an image."""
     if path.suffix.lower() == ".npy":
-        array = torch.from_numpy(np.load(path, allow_pickle=False))
-    else:
-        coded = read_image(path)
-        if ((coded * 255).round() - coded * 255).abs().max() < 1e-3:  # no level between those of 8 bits
-            raise ValueError(f"{path.name}: a normal map needs 16 bits; 8 tilt the normals by up to 0.4 degrees.")
-        array = torch.where((coded == 0).all(-1, keepdim=True), 0.0, 2 * coded - 1)
-    check_shape(Path(path.name), array, shape)
-    return array
+        size_of(path)
+        stored = np.load(path, mmap_mode="r", allow_pickle=False)  # its header alone, so far
+        check_shape(Path(path.name), stored.shape, shape)
+        if stored.dtype.kind not in "fiu":
+            raise ValueError(f"{path.name}: must hold real numbers; found {stored.dtype}.")
+        return torch.from_numpy(stored.astype(np.float64))
+    check_shape(Path(path.name), (*image_size(path), *shape[2:]), shape)
+    coded = read_image(path, max_pixels=math.prod(shape[:2]))
+    check_shape(Path(path.name), coded.shape, shape)
+    if ((coded * 255).round() - coded * 255).abs().max() < 1e-3:  # no level between those of 8 bits
+        raise ValueError(f"{path.name}: a normal map needs 16 bits; 8 tilt the normals by up to 0.4 degrees.")
+    return torch.where((coded == 0).all(-1, keepdim=True), 0.0, 2 * coded - 1)

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from inverse.files.regular import read_text, size_of
 from torchbrdf import Cosines, TabulatedBRDF
 
 # Relative sensitivity of red, green and blue, over the range of the stored numbers.
@@ -43,9 +44,9 @@ def read_gonioreflectometer(path: str | Path) -> Measurements:
 
     A header gives the number of wavelengths and then the wavelengths [nm]; lines from `#` on are comments.
     Raises: ValueError, with the file and what is wrong, for text that is not a number, a header that does not
-    fit, rows that are not whole, angles out of [0, pi/2], or values that are not finite.
+    fit, rows that are not whole, angles out of [0, pi/2], values that are not finite, wavelengths not above 0.
     """
-    words = [word for line in Path(path).read_text().splitlines() for word in line.split("#")[0].split()]
+    words = [word for line in read_text(path).splitlines() for word in line.split("#")[0].split()]
     try:
         numbers = np.array([float(word) for word in words])
     except ValueError as error:
@@ -61,8 +62,11 @@ def read_gonioreflectometer(path: str | Path) -> Measurements:
     polar = table[:, [0, 2]]
     if not bool(table.isfinite().all()) or not bool(((polar >= 0) & (polar <= math.pi / 2)).all()):
         raise ValueError(f"{path}: polar angles must lie in [0, 1.571] rad and all numbers be finite.")
+    wavelengths = torch.from_numpy(numbers[1 : 1 + count])
+    if not bool((wavelengths.isfinite() & (wavelengths > 0)).all()):
+        raise ValueError(f"{path}: wavelengths must be finite and positive [nm]; found {wavelengths.tolist()[:8]}.")
     light, view = (_direction(table[:, k], table[:, k + 1]) for k in (0, 2))
-    return Measurements(light, view, table[:, 4:], torch.from_numpy(numbers[1 : 1 + count]))
+    return Measurements(light, view, table[:, 4:], wavelengths)
 
 
 def read_merl(path: str | Path) -> TabulatedBRDF:
@@ -74,17 +78,18 @@ def read_merl(path: str | Path) -> TabulatedBRDF:
     Raises: ValueError for a file of another size than its header says, or whose dimensions are not a table.
     Source: Matusik, Pfister, Brand & McMillan 2003, "A data-driven reflectance model", DOI 10.1145/882262.882343.
     """
-    data = Path(path).read_bytes()
-    if len(data) < _MERL_HEADER:
-        raise ValueError(f"{path}: not a MERL file: {len(data)} bytes, its header alone has {_MERL_HEADER}.")
-    half, difference, azimuth = (int(n) for n in np.frombuffer(data[:_MERL_HEADER], "<i4"))
+    size = size_of(path)
+    if size < _MERL_HEADER:
+        raise ValueError(f"{path}: not a MERL file: {size} bytes, its header alone has {_MERL_HEADER}.")
+    with Path(path).open("rb") as file:
+        half, difference, azimuth = (int(n) for n in np.frombuffer(file.read(_MERL_HEADER), "<i4"))
     expected = _MERL_HEADER + 3 * 8 * half * difference * azimuth
-    if min(half, difference, azimuth) < 1 or azimuth % 2 or len(data) != expected:
+    if min(half, difference, azimuth) < 1 or azimuth % 2 or size != expected:
         raise ValueError(
             f"{path}: not a MERL file: dimensions ({half}, {difference}, {azimuth}) ask for {expected} bytes, "
-            f"with an even third; found {len(data)}."
+            f"with an even third; found {size}."
         )
-    raw = np.frombuffer(data, "<f8", offset=_MERL_HEADER).reshape(3, half, difference, azimuth)
+    raw = np.fromfile(path, "<f8", offset=_MERL_HEADER).reshape(3, half, difference, azimuth)
     if not np.isfinite(raw).all():
         raise ValueError(f"{path}: {int((~np.isfinite(raw)).sum())} of {raw.size} values are not finite.")
     table = np.clip(raw, 0, None) * np.array(_MERL_SCALE)[:, None, None, None]
@@ -100,10 +105,11 @@ def read_optical_constants(path: str | Path, wavelengths: Tensor) -> tuple[Tenso
 
     Understands `tabulated nk`, `tabulated n`, `tabulated k` (linear between entries) and formulas 1, 2 and 4
     (Sellmeier, Sellmeier-2, RefractiveIndex.INFO); k is 0 where the file has none.
-    Raises: ValueError, with the file, for other kinds of data, none at all, text that is not a number, or
-    wavelengths outside the range of the data.
+    Raises: ValueError, with the file, for other kinds of data, none at all, text that is not a finite number,
+    wavelengths in no order or outside the range of the data, and where n is not above 0 or k is below it, as
+    beside the pole of a formula.
     """
-    text = Path(path).read_text()
+    text = read_text(path)
     micro = wavelengths.detach().double().numpy() * _MICRO_PER_NANO
     index, absorption = None, np.zeros_like(micro)
     for kind, body in re.findall(r"^ *- type: *(\S+ \S+)\s*\n(.*?)(?=^ *- type:|^\S|\Z)", text, re.M | re.S):
@@ -111,6 +117,8 @@ def read_optical_constants(path: str | Path, wavelengths: Tensor) -> tuple[Tenso
             if kind in ("tabulated nk", "tabulated n", "tabulated k"):
                 lines = body.split("data: |", 1)[-1].strip().splitlines()
                 table = np.array([[float(x) for x in line.split()] for line in lines])
+                if not np.isfinite(table).all() or not (np.diff(table[:, 0]) > 0).all():
+                    raise ValueError("a table must be finite, its wavelengths increasing")
                 _check_range(path, micro, table[0, 0], table[-1, 0])
                 columns = [np.interp(micro, table[:, 0], column) for column in table.T[1:]]
                 if kind != "tabulated k":
@@ -120,13 +128,20 @@ def read_optical_constants(path: str | Path, wavelengths: Tensor) -> tuple[Tenso
             elif kind in _FORMULAS:
                 low, high = _numbers(body, "wavelength_range")
                 _check_range(path, micro, low, high)
-                index = np.sqrt(_FORMULAS[kind](micro, _numbers(body, "coefficients")))
+                with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # refused below
+                    squared = _FORMULAS[kind](micro, _numbers(body, "coefficients"))
+                index = np.sqrt(np.where(squared > 0, squared, np.nan))
             else:
                 raise ValueError(f"data of type '{kind}' is not an index")
         except (ValueError, IndexError, AttributeError) as error:
             raise ValueError(f"{path}: {error}") from None
     if index is None:
         raise ValueError(f"{path}: no refractive index found: is this a refractiveindex.info file?")
+    wrong = ~(np.isfinite(index) & (index > 0) & np.isfinite(absorption) & (absorption >= 0))
+    if wrong.any():
+        raise ValueError(
+            f"{path}: n must be finite and above 0, k finite and not below it; not so at {micro[wrong][:8] * 1e3} nm."
+        )
     return torch.from_numpy(index).to(wavelengths), torch.from_numpy(absorption).to(wavelengths)
 
 

@@ -30,7 +30,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from inverse.files.images import SUFFIXES, read_image, write_image
+from inverse.files.images import MAX_PIXELS, SUFFIXES, image_size, read_image, write_image
 from inverse.files.layout import StackFile, check_shape, stack_text, text_lights, text_lines, text_surface
 from inverse.files.whole_folders import check_manifest, whole_folder
 from inverse.scene import TO_CAMERA, Light, Scene, Surface, pixel_average
@@ -55,12 +55,16 @@ class Photographs:
 def read_stack(
     folder: str | Path, *, images: str | None = None, mask: str | None = None, lights: str | None = None,
     geometry: str | None = None, color: str = "linear", dtype: torch.dtype = torch.float32,
+    max_pixels: int = MAX_PIXELS,
 ) -> Photographs:  # fmt: skip
     """Read a folder of the layout above; ValueError or OSError names the file, the rule and what was found.
 
     `images` (a pattern), `mask`, `lights` (a file as lights.txt; both relative to the folder) and `geometry` (a line
-    as in geometry.txt) stand in for the folder's own. `color` is "linear" or "srgb".
+    as in geometry.txt) stand in for the folder's own. `color` is "linear" or "srgb". No image may have more than
+    `max_pixels`; their sizes are compared before one of them is read.
     """
+    if not str(folder):
+        raise FileNotFoundError("the folder of a stack must have a name; found an empty one.")
     folder = Path(folder)
     if not folder.is_dir():
         raise FileNotFoundError(f"{folder}: no such folder.")
@@ -76,9 +80,11 @@ def read_stack(
         raise FileNotFoundError(f"{folder}: no images {images or ' '.join('*' + s for s in SUFFIXES)}.")
     stack_file = StackFile.read(folder / "stack.json")
     light_sets = _light_sets(folder, [path.name for path in paths], lights, stack_file)
-    stack = [read_image(path, color) for path in paths]
+    for path in paths:
+        check_shape(path, image_size(path), image_size(paths[0]))
+    stack = [read_image(path, color, max_pixels=max_pixels) for path in paths]
     for path, image in zip(paths, stack, strict=True):
-        check_shape(path, image, stack[0].shape)
+        check_shape(path, image.shape, stack[0].shape)
     surface = text_surface(line, folder, (stack[0].shape[0], stack[0].shape[1]), dtype)
     for path in masks:
         surface = _masked(surface, path)
@@ -124,9 +130,16 @@ def write_stack(
             write_image(fresh / name, image, bits)
         write_image(fresh / "mask.png", mask.float(), 8)
         for name, array in maps.items():
-            np.save(fresh / name, array.detach().cpu().numpy())
+            _save(fresh / name, array.detach().cpu().numpy())
         (fresh / "stack.json").write_text(stack_text(scene.sensor, lights))
         (fresh / "geometry.txt").write_text(f"normals {' '.join(maps)}\n")
+
+
+def _save(path: Path, array: np.ndarray) -> None:
+    try:
+        np.save(path, array)
+    except OSError as error:  # of a full disk, without the name
+        raise OSError(f"{path}: cannot be written: {error}") from error
 
 
 def _light_sets(
@@ -138,10 +151,7 @@ def _light_sets(
         if dark:
             raise ValueError(f"{folder / 'stack.json'}: has no lights for the images {', '.join(dark)}.")
         return [stack_file.lights[name] for name in names]
-    lights = text_lights(folder / (text or "lights.txt"))
-    if len(lights) != len(names):
-        raise ValueError(f"{folder}: one light an image; found {len(lights)} lights and {len(names)} images.")
-    return list(lights)
+    return list(text_lights(folder / (text or "lights.txt"), len(names)))
 
 
 def _image_files(folder: Path, pattern: str) -> list[Path]:
@@ -158,8 +168,8 @@ def _check_exposed(path: Path, pixels: Tensor) -> None:
 
 
 def _masked(surface: Surface, path: Path) -> Surface:
-    inside = read_image(path).amax(-1) > 0.5
-    check_shape(path, inside, surface.mask.shape)
+    check_shape(path, image_size(path), surface.mask.shape)
+    inside = read_image(path, max_pixels=surface.mask.numel()).amax(-1) > 0.5
     kept = surface.mask & inside
     if not kept.any():
         raise ValueError(f"{path}: empty mask: none of its {int(inside.sum())} bright pixels is on the geometry.")

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from inverse.files.regular import read_text, size_of
+
 # A line a file, "digest  name", as the common tool `sha256sum -c` reads it.
 MANIFEST = "SHA256SUMS"
 
@@ -46,8 +48,10 @@ def whole_folder(target: Path, *, overwrite: bool, ours: Callable[[str], bool]) 
             if old:
                 aside.rename(target)
             raise
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(fresh, ignore_errors=True)
+        if isinstance(error, OSError) and str(fresh) in str(error):  # a full disk, say; the user knows the target alone
+            raise OSError(str(error).replace(str(fresh), str(target))) from error
         raise
     if old:
         shutil.rmtree(aside, ignore_errors=True)
@@ -70,9 +74,9 @@ def manifest(folder: Path) -> dict[str, str]:
     path = folder / MANIFEST
     if not path.is_file():
         return {}
-    lines = [line.split(maxsplit=1) for line in path.read_text(errors="replace").splitlines()]
-    if not all(len(line) == 2 for line in lines):
-        raise ValueError(f"{path}: a line is a digest and a file name.")
+    lines = [line.split(maxsplit=1) for line in read_text(path).splitlines()]
+    if not all(len(line) == 2 and Path(line[1]).name == line[1] for line in lines):
+        raise ValueError(f"{path}: a line is a digest and the name of a file of this folder.")
     return {name: digest for digest, name in lines}
 
 
@@ -95,4 +99,9 @@ def _checked(target: Path, overwrite: bool, ours: Callable[[str], bool]) -> bool
 
 
 def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    size_of(path)
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()

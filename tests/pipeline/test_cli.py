@@ -2,13 +2,16 @@
 
 import json
 import math
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
-from inverse import read_image, read_stack
+from inverse import cli, read_image, read_stack
 from inverse.cli import main
 
 
@@ -141,13 +144,13 @@ def test_render_repeats_with_the_seed(tmp_path):
         (["fit", "FOLDER", "--limb", "100"], "limb 100"),
         (["fit", "FOLDER", "--exposure", "0"], "Sensor.exposure must be positive"),
         (["fit", "FOLDER", "--starts", "0"], "starts must be a whole number of at least 1"),
-        (["fit", "FOLDER", "--bootstrap", "1"], "at least 2"),
-        (["fit", "FOLDER", "--bootstrap", "-3"], "at least 2"),
         (["render", "--output", "NEW", "--sigma", "200"], "sigma must lie in"),
         (["render", "--output", "NEW", "--albedo", "1.5"], "albedo must lie in"),
         (["render", "--output", "NEW", "--size", "0"], "at least 1"),
         (["render", "--output", "NEW", "--noise", "-1"], "read_noise must not be negative"),
-        (["render", "--output", "NEW", "--lights-deg", "nan"], "direction"),
+        (["render", "--output", "NEW", "--size", "40000"], "GiB of memory"),
+        (["fit", ""], "must have a name"),
+        (["fit", "FOLDER", "--max-megapixels", "0.001"], "0.001 megapixels (max_pixels raises it); found 48 x 48"),
     ],
 )
 def test_bad_input_is_one_line_and_code_2(arguments, message, folder, tmp_path, capsys):
@@ -161,8 +164,14 @@ def test_bad_input_is_one_line_and_code_2(arguments, message, folder, tmp_path, 
 
 
 @pytest.mark.parametrize(
-    "arguments", [[], ["paint"], ["fit"], ["fit", "x", "--model", "phong"], ["render"], ["render", "--output"]]
-)
+    "arguments",
+    [
+        [], ["paint"], ["fit"], ["fit", "x", "--model", "phong"], ["render"], ["render", "--output"],
+        ["fit", "x", "--bootstrap", "1"], ["fit", "x", "--bootstrap", "-3"], ["fit", "x", "--exposure", "nan"],
+        ["render", "--output", "x", "--lights-deg", "inf"], ["render", "--output", "x", "--seed", str(2**64)],
+        ["render", "--output", "x", "--noise", "inf"],
+    ],
+)  # fmt: skip
 def test_bad_usage_is_one_line_and_code_2(arguments, capsys):
     with pytest.raises(SystemExit) as stop:
         main(arguments)
@@ -181,3 +190,77 @@ def test_module_runs():
     )
     assert (failed.returncode, failed.stdout) == (2, "")
     assert failed.stderr == "error: absent: no such folder.\n"
+
+
+def run(*arguments, **options):
+    return subprocess.run([sys.executable, "-m", "inverse", *arguments], text=True, check=False, **options)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_output_that_cannot_be_written_is_one_line(folder, form):
+    with open("/dev/full", "w") as full:
+        done = run("fit", str(folder), "--model", "lambert", *form, stdout=full, stderr=subprocess.PIPE)
+    assert done.returncode == 2
+    assert done.stderr == "error: standard output: [Errno 28] No space left on device\n"
+
+
+def test_a_reader_that_left_is_one_line(folder):
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write, "w") as gone:
+        done = run("fit", str(folder), "--model", "lambert", stdout=gone, stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (2, "error: standard output: [Errno 32] Broken pipe\n")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (KeyboardInterrupt(), 130, "error: interrupted; what is printed was finished\n"),
+        (MemoryError(), 2, "error: out of memory: smaller or fewer images may fit\n"),
+        (ValueError("no refit"), 2, "error: no refit\n"),
+    ],
+)
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_a_finished_fit_is_printed_whatever_follows(folder, capsys, monkeypatch, error, code, line, form):  # noqa: PLR0917
+    def stopped(*_, **__):
+        raise error
+
+    monkeypatch.setattr(cli, "bootstrap", stopped)
+    assert main(["fit", str(folder), "--model", "lambert", "--bootstrap", "4", *form]) == code
+    out, err = capsys.readouterr()
+    assert err == line
+    assert strict_json(out)["status"] == "converged" if form else "albedo" in out
+
+
+def test_memory_that_torch_cannot_have_is_one_line(capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(cli, "render", lambda *_: torch.empty(2**50))
+    assert main(["render", "--output", str(tmp_path / "s"), "--size", "16"]) == 2
+    assert capsys.readouterr().err == "error: out of memory: smaller or fewer images may fit\n"
+
+
+def test_other_errors_are_not_hidden(monkeypatch, tmp_path):
+    def broken(*_):
+        raise RuntimeError("a defect")
+
+    monkeypatch.setattr(cli, "render", broken)
+    with pytest.raises(RuntimeError, match="a defect"):
+        main(["render", "--output", str(tmp_path / "s"), "--size", "16"])
+
+
+def test_a_full_disk_names_the_file_and_leaves_nothing(tmp_path):
+    """A limit on the size of files stands for the disk: PNG and NumPy meet it on different files."""
+    limited = (
+        "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (N, N));"
+        "import inverse.cli; sys.exit(inverse.cli.main())"
+    )
+    render = ["render", "--output", tmp_path / "s", "--size", "48"]
+    for limit, name in ((300, "image_0.png"), (8000, "normals.npy")):
+        done = subprocess.run(
+            [sys.executable, "-c", limited.replace("N", str(limit)), *render],
+            capture_output=True, text=True, check=False, env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
+        )  # fmt: skip
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"error: {tmp_path / 's' / name}: cannot be written: ")
+        assert done.stderr.count("\n") == 1
+        assert list(tmp_path.iterdir()) == []

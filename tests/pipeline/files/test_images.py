@@ -1,5 +1,6 @@
 """Images on disk: every bit arrives, and what cannot be read says why."""
 
+import struct
 from pathlib import Path
 
 import kornia_rs
@@ -48,7 +49,8 @@ def test_8_bits(tmp_path, suffix, channels):
 )
 def test_tiff_of_16_bits(tmp_path, layout):
     array = samples(16, 3)
-    tifffile.imwrite(tmp_path / "a.tif", array, photometric="rgb", **layout)
+    stored = np.moveaxis(array, -1, 0) if "planarconfig" in layout else array
+    tifffile.imwrite(tmp_path / "a.tif", stored, photometric="rgb", **layout)
     assert_reads(tmp_path / "a.tif", array)
 
 
@@ -149,3 +151,30 @@ def test_other_images_are_refused(tmp_path):
         read_image(tmp_path / "b.tif")
     with pytest.raises(ValueError, match='color must be "linear" or "srgb"; found \'sRGB\''):
         read_image(tmp_path / "b.tif", "sRGB")
+
+
+def test_a_header_beyond_the_limit_is_refused_before_the_pixels_are_read(tmp_path):
+    """A few hundred bytes that announce 10 000 million pixels, in each format."""
+    (tmp_path / "a.png").write_bytes(png_bytes(samples(16, 3)).replace(struct.pack(">II", 7, 5), b"\0\x01\x86\xa0" * 2))
+    (tmp_path / "a.tga").write_bytes(struct.pack("<BBB5xHHHHBB", 0, 0, 2, 0, 0, 65535, 65535, 24, 0))
+    tifffile.imwrite(tmp_path / "a.tif", np.lib.stride_tricks.as_strided(np.zeros(1, np.uint8), (9500, 9500), (0, 0)),
+                     compression="zlib", rowsperstrip=9500)  # fmt: skip
+    for path in tmp_path.iterdir():
+        with pytest.raises(ValueError, match=rf"{path.name}: an image may have 80 megapixels .*found \d+ x \d+"):
+            read_image(path)
+
+
+def test_the_limit_can_be_raised_and_lowered(tmp_path):
+    write_image(tmp_path / "a.png", torch.rand(5, 7, 3))
+    assert read_image(tmp_path / "a.png", max_pixels=35).shape == (5, 7, 3)
+    with pytest.raises(ValueError, match=r"3\.4e-05 megapixels.*found 5 x 7"):
+        read_image(tmp_path / "a.png", max_pixels=34)
+
+
+@pytest.mark.parametrize("suffix", ["png", "tga"])
+def test_the_suffix_says_what_a_file_is(tmp_path, suffix):
+    other = {"png": "tga", "tga": "png"}[suffix]
+    Image.fromarray(samples(8, 3)).save(tmp_path / f"a.{other}")
+    (tmp_path / f"a.{other}").rename(tmp_path / f"a.{suffix}")
+    with pytest.raises(OSError, match=f"a.{suffix}: cannot be read"):
+        read_image(tmp_path / f"a.{suffix}")

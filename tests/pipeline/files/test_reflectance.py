@@ -39,6 +39,8 @@ def test_gonioreflectometer(tmp_path):
         ("1\n450\n2.5 0 1 3 0.25", r"polar angles must lie in \[0, 1.571\]"),
         ("1\n450\n0.5 0 1 3 nan", "finite"),
         ("1.5\n450\n0.5 0 1 3 1", "announces 1"),
+        ("1\nnan\n0.5 0 1 3 1", "wavelengths must be finite and positive"),
+        ("1\n0\n0.5 0 1 3 1", "wavelengths must be finite and positive"),
     ],
 )
 def test_gonioreflectometer_refuses(tmp_path, text, match):
@@ -118,6 +120,12 @@ def test_optical_constants(tmp_path):
         (TABLE.replace("0.6", "0.49"), "covers 400 to 490 nm"),
         (TABLE.replace("tabulated nk", "tabulated n2"), "type 'tabulated n2' is not an index"),
         (SAPPHIRE.replace("coefficients", "numbers"), "coefficients is missing"),
+        (TABLE.replace("0.6 2.0", "0.6 nan"), "a table must be finite"),
+        (TABLE.replace("0.6 2.0 4.0", "0.6 2.0 4.0\n        0.5 2.0 4.0"), "its wavelengths increasing"),
+        (TABLE.replace("0.4 1.0 3.0", "0.4 -3.0 3.0"), "n must be finite and above 0"),
+        (TABLE.replace("0.4 1.0 3.0", "0.4 1.0 -9.0"), "k finite and not below it"),
+        (SAPPHIRE.replace("0.06144821", "0.5"), r"n must be .*not so at \[500\.\] nm"),  # a pole of formula 1
+        (SAPPHIRE.replace("0 1.023798", "-9 1.023798"), "n must be"),  # n^2 below 0
     ],
 )
 def test_optical_constants_refuse(tmp_path, text, match):
