@@ -1,7 +1,6 @@
 """When a model is evaluated by a compiled kernel, and the switch that decides it."""
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
@@ -54,10 +53,10 @@ def by_kernel(model: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> Tenso
     arrays = (normal, light, view, *material)
     if not all(map(_is_plain, arrays)) or any(t.dtype != normal.dtype for t in arrays):
         return None
-    if normal.dtype not in SUPPORTED_DTYPES or _pixels(arrays) < _smallest.get() or not is_installed():
+    form = form_for(model) if normal.dtype in SUPPORTED_DTYPES else None
+    if form is None or form.pixels(arrays[:3], material) < max(_smallest.get(), 1):
         return None
-    form = form_for(model)
-    if form is None or form.kernel(material, normal.dtype) is None:
+    if not is_installed() or form.kernel(material, normal.dtype) is None:
         return None
     return reflectance(form.place, normal, light, view, material, checked=True)
 
@@ -77,13 +76,3 @@ def _is_transformed() -> bool:
         or forward_ad._current_level >= 0
     )
 
-
-def _pixels(arrays: Sequence[Tensor]) -> int:
-    """Pixels of three vectors (..., 3); 0 where they are none, or what follows has pixels of its own that do not fit."""
-    vectors = arrays[:3]
-    if any(v.ndim == 0 or v.shape[-1] != 3 for v in vectors):
-        return 0
-    try:
-        return math.prod(torch.broadcast_shapes(*(v.shape[:-1] for v in vectors)))
-    except RuntimeError:
-        return 0

@@ -60,7 +60,7 @@ class Kernel:
     def lead_of(self, arrays: Sequence[Tensor]) -> tuple[int, ...]:
         """Shape of the pixels."""
         shapes = [array.shape[: array.ndim - len(size)] for array, size in zip(arrays, self.sizes, strict=True)]
-        return tuple(torch.broadcast_shapes(*shapes))
+        return common_shape(shapes)
 
     def loop(self, repeated: tuple[bool, ...], wanted: tuple[bool, ...]) -> Compiled:
         """The loop over arrays of which some are the same for all pixels; no array wanted is the value."""
@@ -107,6 +107,12 @@ class Kernel:
         own, *others = range(0, pixels, share)
         waiting = [_threads(os.getpid()).submit(part, first) for first in others]
         return part(own) + sum(future.result() for future in waiting)
+
+
+def common_shape(shapes: Sequence[Sequence[int]]) -> tuple[int, ...]:
+    """What shapes broadcast to; raises RuntimeError where they do not. Mostly they are one, which is soon seen."""
+    first = tuple(shapes[0])
+    return first if all(tuple(shape) == first for shape in shapes) else tuple(torch.broadcast_shapes(*shapes))
 
 
 @cache

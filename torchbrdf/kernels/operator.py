@@ -73,22 +73,30 @@ def _by_formula(
     return torch.autograd.grad(value, asked, weight, create_graph=again, allow_unused=True, materialize_grads=True)
 
 
-def _keep(ctx: Any, inputs: tuple[Any, ...], output: Tensor) -> None:
-    form, normal, light, view, material, _ = inputs
-    ctx.form = form
-    ctx.save_for_backward(normal, light, view, *material)
+class _Reflectance(torch.autograd.Function):
+    """The operator with its derivatives; `torch.library.register_autograd` would take longer than a small call."""
+
+    @staticmethod
+    def forward(ctx: Any, form: int, checked: bool, *arrays: Tensor) -> Tensor:
+        ctx.form = form
+        ctx.save_for_backward(*arrays)
+        with torch._C._AutoDispatchBelowAutograd():
+            return torch.ops.torchbrdf.reflectance(form, *arrays[:3], arrays[3:], checked)
+
+    @staticmethod
+    def backward(ctx: Any, weight: Tensor) -> tuple[Tensor | None, ...]:
+        arrays, wanted = ctx.saved_tensors, list(ctx.needs_input_grad[2:])
+        if torch.is_grad_enabled():  # the derivatives will be differentiated in turn
+            asked = iter(_by_formula(ctx.form, arrays, weight, wanted, again=True))
+            return None, None, *(next(asked) if want else None for want in wanted)
+        made = torch.ops.torchbrdf.reflectance_slopes(ctx.form, *arrays[:3], arrays[3:], weight, wanted)
+        return None, None, *(slope if want else None for slope, want in zip(made, wanted, strict=True))
 
 
-def _backward(ctx: Any, weight: Tensor) -> tuple[Any, ...]:
-    arrays = ctx.saved_tensors
-    wanted = [*ctx.needs_input_grad[1:4], *ctx.needs_input_grad[4]]
-    if torch.is_grad_enabled():  # the derivatives will be differentiated in turn
-        asked = iter(_by_formula(ctx.form, arrays, weight, wanted, again=True))
-        slopes = [next(asked) if want else None for want in wanted]
-    else:
-        made = torch.ops.torchbrdf.reflectance_slopes(ctx.form, *arrays[:3], list(arrays[3:]), weight, wanted)
-        slopes = [slope if want else None for slope, want in zip(made, wanted, strict=True)]
-    return None, *slopes[:3], slopes[3:], None
+def _differentiable(
+    form: int, normal: Tensor, light: Tensor, view: Tensor, material: Sequence[Tensor], checked: bool
+) -> Any:
+    return _Reflectance.apply(form, checked, normal, light, view, *material)
 
 
 def _unlooked_at(
@@ -113,10 +121,10 @@ def _slopes_without_numbers(
 _library.impl("reflectance", _value, "CPU")
 _library.impl("reflectance", _formula, "CUDA")
 _library.impl("reflectance", _unlooked_at, "FuncTorchBatched")
+_library.impl("reflectance", _differentiable, "Autograd")
 _library.impl("reflectance_slopes", _slopes, "CompositeExplicitAutograd")
 torch.library.register_fake(_VALUE, _unlooked_at, lib=_library)
 torch.library.register_fake(_SLOPES, _slopes_without_numbers, lib=_library)
-torch.library.register_autograd(_VALUE, _backward, setup_context=_keep, lib=_library)
 
 
 def reflectance(

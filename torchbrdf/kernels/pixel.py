@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import torch
 from torch import Tensor, nn
@@ -17,6 +18,7 @@ from torchbrdf.parameters import Parametric, declared
 # Directions and a raw parameter at which nothing happens to be 0 or 1 while a formula is recorded.
 _SOMEWHERE = ((0.36, 0.48, 0.8), (0.6, 0.0, 0.8), (0.0, 0.28, 0.96))
 _RAW = 0.3
+_OF_ANY_MODULE = frozenset(vars(nn.Module()))
 
 
 @dataclass(frozen=True)
@@ -41,11 +43,17 @@ class Pixel:
         return len(self.value)
 
 
+@cache
+def _names(owner: type[Parametric]) -> tuple[str, ...]:
+    """What tensors of a class may be called, in order."""
+    entries = declared(owner.__new__(owner))
+    return tuple(f"{kind}_{entry.name}" for entry in entries for kind in ("raw", "fixed"))
+
+
 def stored(model: Parametric) -> dict[str, Tensor]:
     """The tensors that a module's declared parameters are stored in, by name, in order."""
     tensors = {**model._parameters, **model._buffers}
-    names = [f"{kind}_{entry.name}" for entry in declared(model) for kind in ("raw", "fixed")]
-    return {name: tensor for name in names if (tensor := tensors.get(name)) is not None}
+    return {name: tensor for name in _names(type(model)) if (tensor := tensors.get(name)) is not None}
 
 
 def with_stored(model: BRDF, tensors: Mapping[str, Tensor]) -> BRDF:
@@ -60,8 +68,7 @@ def form_of(model: BRDF) -> Hashable | None:
     """All that a model's formula depends on beside its parameters; None where that is not known to be plain numbers."""
     if model._modules or len(stored(model)) != len(model._parameters) + len(model._buffers):
         return None
-    private = vars(nn.Module())
-    settings = {name: value for name, value in vars(model).items() if name not in private}
+    settings = {name: value for name, value in vars(model).items() if name not in _OF_ANY_MODULE}
     plain = _frozen(settings)
     return None if plain is None else (type(model), tuple(stored(model)), plain)
 

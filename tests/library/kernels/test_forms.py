@@ -4,7 +4,7 @@ import torch
 from helpers.kernels import frames, made, with_compiler
 from torch.testing import assert_close
 
-from torchbrdf import GGX, OrenNayar
+from torchbrdf import GGX, OrenNayar, native
 from torchbrdf.fields import FieldBRDF
 from torchbrdf.kernels.forms import form_at, form_for
 
@@ -16,6 +16,16 @@ class Sorted(FieldBRDF):
 
     def fields(self, cosines):
         return (torch.stack((cosines.light, cosines.view)).sort(0)[0][0],)
+
+    def parts_of(self, *fields):
+        return {"all": fields[0]}
+
+
+class Normalised(FieldBRDF):
+    """A field divided by its largest value over all pixels: no function of one pixel."""
+
+    def fields(self, cosines):
+        return (cosines.light / cosines.light.max(),)
 
     def parts_of(self, *fields):
         return {"all": fields[0]}
@@ -49,6 +59,25 @@ def test_a_formula_without_scalar_steps_has_no_kernel():
     form = form_for(Sorted())
     assert form is not None
     assert form.kernel([], torch.float32) is None
+
+
+def test_a_formula_that_mixes_pixels_has_no_kernel():
+    form = form_for(Normalised())
+    assert form is not None
+    assert form.kernel([], torch.float32) is None
+    vectors = frames(20, torch.float32)
+    with native():
+        assert_close(Normalised()(*vectors), form.formula(*vectors, []), rtol=1e-6, atol=0)
+
+
+def test_pixels_are_counted_together():
+    form = form_for(OrenNayar())
+    assert form is not None
+    x, y = torch.zeros(4, 1, 3), torch.zeros(6, 3)
+    assert form.pixels([x, y, y], [torch.zeros(3), torch.zeros(())]) == 24
+    assert form.pixels([y, y, y], [torch.zeros(5, 1, 3), torch.zeros(())]) == 30
+    assert form.pixels([y, y, y], [torch.zeros(5, 3), torch.zeros(())]) == 0
+    assert form.pixels([y, torch.zeros(6, 2), y], [torch.zeros(3), torch.zeros(())]) == 0
 
 
 def test_formula_of_a_form():
