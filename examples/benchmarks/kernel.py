@@ -3,21 +3,24 @@
     OMP_NUM_THREADS=1 python examples/benchmarks/kernel.py [--pixels 1048576] [--repeats 15]
 
 Needs `pip install torchbrdf[fast]`. Float32, one thread unless stated, per-texel roughness and RGB albedo, which alone
-have gradients unless stated. Calls take turns, so that a slower minute slows them all; the shortest time counts.
+have gradients unless stated. Calls take turns, so that a slower minute slows them all; the shortest processor time
+counts.
 """
 
 import argparse
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from typing import TypeVar
 
 import torch
 from naive import naive_oren_nayar
 from torch import Tensor
 
-from torchbrdf import EON, FastRoughSurface, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar, native
+from torchbrdf import EON, FieldBRDF, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar, native
 
 FIRST_CALL = 4096  # pixels of the call that compiles
+Key = TypeVar("Key", bound=Hashable)
 
 
 class Inputs:
@@ -33,27 +36,30 @@ class Inputs:
         self.albedo = 0.1 + 0.8 * torch.rand(pixels, 3, generator=g)
 
 
-def models_of(x: Inputs) -> dict[str, Callable[..., Tensor]]:
-    """By name: models per texel, and the code by hand with the same gradients."""
-    by_hand = x.rough.clone().requires_grad_(), x.albedo.clone().requires_grad_()
+def by_hand_of(x: Inputs) -> tuple[Callable[..., Tensor], list[Tensor]]:
+    """The code by hand, and the leaves it has derivatives by."""
+    rough, albedo = x.rough.clone().requires_grad_(), x.albedo.clone().requires_grad_()
+    return lambda *vectors: naive_oren_nayar(*vectors, rough, albedo), [rough, albedo]
+
+
+def models_of(x: Inputs) -> dict[str, FieldBRDF]:
+    """By name: models per texel."""
     return {
-        "by hand": lambda *vectors: naive_oren_nayar(*vectors, *by_hand),
         "OrenNayar": OrenNayar(albedo=x.albedo, sigma=x.rough),
         "QualitativeOrenNayar": QualitativeOrenNayar(albedo=x.albedo, sigma=x.rough),
         "FujiiOrenNayar": FujiiOrenNayar(albedo=x.albedo, roughness=x.rough),
         "EON": EON(albedo=x.albedo, roughness=x.rough),
-        "FastRoughSurface, 2 bounces": FastRoughSurface(albedo=x.albedo, sigma=x.rough, bounces=2),
     }
 
 
-def shortest(calls: dict[str, Callable[[], object]], repeats: int) -> dict[str, float]:
-    """Seconds of the quickest of some calls of each, which take turns."""
-    best = dict.fromkeys(calls, math.inf)
+def shortest(calls: dict[Key, Callable[[], object]], repeats: int) -> dict[Key, float]:
+    """Processor seconds of the quickest of some calls of each, which take turns."""
+    best: dict[Key, float] = dict.fromkeys(calls, math.inf)
     for _ in range(repeats):
         for name, call in calls.items():
-            began = time.perf_counter()
+            began = time.process_time()
             call()
-            best[name] = min(best[name], time.perf_counter() - began)
+            best[name] = min(best[name], time.process_time() - began)
     return best
 
 
@@ -65,10 +71,14 @@ def forward_of(model: Callable[..., Tensor], vectors: Sequence[Tensor], *, small
     return call
 
 
-def both_of(model: Callable[..., Tensor], vectors: Sequence[Tensor], *, smallest: float) -> Callable[[], object]:
+def both_of(
+    model: Callable[..., Tensor], given: Sequence[Tensor], vectors: Sequence[Tensor], weight: Tensor, *, smallest: float
+) -> Callable[[], object]:
+    """Derivatives of sum(weight * f_r) by what is given."""
+
     def call() -> None:
         with native(smallest):
-            model(*vectors).sum().backward()
+            torch.autograd.grad(model(*vectors), given, weight)
 
     return call
 
@@ -76,27 +86,32 @@ def both_of(model: Callable[..., Tensor], vectors: Sequence[Tensor], *, smallest
 def table(pixels: int, repeats: int) -> None:
     """Speed relative to the code by hand."""
     x = Inputs(pixels)
-    models = models_of(x)
-    forward = {name: forward_of(m, x.vectors, smallest=1) for name, m in models.items()}
-    both = {name: both_of(m, x.vectors, smallest=1) for name, m in models.items()}
+    models, weight = models_of(x), torch.rand(pixels, 3)
     moving = [v.clone().requires_grad_() for v in x.vectors]
-    both["OrenNayar, vectors too"] = both_of(models["OrenNayar"], moving, smallest=1)
-    both["by hand, vectors too"] = both_of(models["by hand"], moving, smallest=1)
-    formula = {f"{name}, formula": both_of(models[name], x.vectors, smallest=math.inf) for name in ("OrenNayar", "EON")}
-    streams = torch.empty(26 * pixels // 2), torch.empty(26 * pixels // 2)
-    calls = {(name, False): call for name, call in forward.items()} | {
-        (name, True): call for name, call in (both | formula).items()
-    }
-    calls["copy", True] = lambda: streams[1].copy_(streams[0])
+    hand, leaves = by_hand_of(x)
+    forward = {"by hand": forward_of(hand, x.vectors, smallest=1)}
+    both = {"by hand": both_of(hand, leaves, x.vectors, weight, smallest=1)}
+    for name, model in models.items():
+        given = list(model.parameters())
+        forward[name] = forward_of(model, x.vectors, smallest=1)
+        both[name] = both_of(model, given, x.vectors, weight, smallest=1)
+        both[f"{name}, by directions too"] = both_of(model, [*given, *moving], moving, weight, smallest=1)
+        forward[f"{name}, formula"] = forward_of(model, x.vectors, smallest=math.inf)
+        both[f"{name}, formula"] = both_of(model, given, x.vectors, weight, smallest=math.inf)
+    # what forward and backward with derivatives by the material read and write: 16 + 24 numbers, half of each
+    source, target = torch.rand(18, pixels), torch.empty(18, pixels)
+    calls: dict[tuple[str, bool], Callable[[], object]] = {(name, False): call for name, call in forward.items()}
+    calls |= {(name, True): call for name, call in both.items()}
+    calls["memory alone", True] = lambda: target.copy_(source)
     spent = shortest(calls, repeats)
-    print(f"{pixels} pixels; speed relative to the code by hand, and nanoseconds a pixel\n")
+    print(f"\n{pixels} pixels; speed relative to the code by hand, and nanoseconds a pixel\n")
     print("| model | forward | forward + backward | ns | ns |")
     print("|---|---|---|---|---|")
-    for name in (*both, *formula, "copy"):
+    for name in (*both, "memory alone"):
         pair = [spent.get((name, backward)) for backward in (False, True)]
         ratios = [f"{spent['by hand', k] / t:.1f} x" if t else "" for k, t in zip((False, True), pair, strict=True)]
         ns = [f"{1e9 * t / pixels:.1f}" if t else "" for t in pair]
-        print(f"| {name} | {' | '.join(ratios)} | {' | '.join(ns)} |")
+        print(f"| {name} | {' | '.join((*ratios, *ns))} |")
 
 
 def sizes(repeats: int) -> None:
@@ -105,9 +120,9 @@ def sizes(repeats: int) -> None:
     print("|---|---|---|---|")
     for pixels in (1, 100, 10_000, 1_000_000):
         x = Inputs(pixels)
-        model, by_hand = OrenNayar(albedo=x.albedo, sigma=x.rough), models_of(x)["by hand"]
+        model = models_of(x)["OrenNayar"]
         calls = {
-            "by hand": forward_of(by_hand, x.vectors, smallest=1),
+            "by hand": forward_of(by_hand_of(x)[0], x.vectors, smallest=1),
             "formula": forward_of(model, x.vectors, smallest=math.inf),
             "kernel": forward_of(model, x.vectors, smallest=1),
         }
@@ -121,8 +136,6 @@ def first_calls() -> None:
     print("\n| first call | forward | backward |  (seconds, recording and compiling)")
     print("|---|---|---|")
     for name, model in models_of(x).items():
-        if name == "by hand":
-            continue
         began = time.perf_counter()
         value = model(*x.vectors)
         middle = time.perf_counter()

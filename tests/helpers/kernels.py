@@ -87,7 +87,7 @@ EVALUATED = {
     "add": lambda x, m: (x[0] + x[1], m[0] + m[1]),
     "subtract": lambda x, m: (x[0] - x[1], m[0] + m[1]),
     "multiply": lambda x, m: (x[0] * x[1], m[0] * m[1]),
-    "divide": lambda x, m: (x[0] / x[1], m[0] * m[1] / (x[1] * x[1])),
+    "reciprocal": lambda x, m: (1 / x[0], m[0] / (x[0] * x[0])),
     "negate": lambda x, m: (-x[0], m[0]),
     "abs": lambda x, m: (x[0].abs(), m[0]),
     "sqrt": lambda x, m: (x[0].sqrt(), m[0] / x[0].sqrt()),

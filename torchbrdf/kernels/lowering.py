@@ -13,10 +13,10 @@ import torch
 
 from torchbrdf.kernels.program import COMPARISONS, TRUTHS, Program
 
-_BINARY = {"add": "fadd", "subtract": "fsub", "multiply": "fmul", "divide": "fdiv"}
+_BINARY = {"add": "fadd", "subtract": "fsub", "multiply": "fmul"}
 _INTRINSIC = {"abs": "fabs", "sqrt": "sqrt"}
 _CONDITION = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
-ARITHMETIC = frozenset((*_BINARY, *_INTRINSIC, *TRUTHS, "negate", "select", "exp"))
+ARITHMETIC = frozenset((*_BINARY, *_INTRINSIC, *TRUTHS, "negate", "reciprocal", "select", "exp"))
 
 
 class Real(NamedTuple):
@@ -153,6 +153,8 @@ def _step(program: Program, place: int, real: Real) -> Iterator[str]:
         yield f"{result} = fcmp {_CONDITION[operation]} {kind} {given[0]}, {given[1]}"
     elif operation == "negate":
         yield f"{result} = fneg {kind} {given[0]}"
+    elif operation == "reciprocal":
+        yield f"{result} = fdiv {kind} {_literal(1.0, real)}, {given[0]}"
     elif operation == "exp":
         yield from _exponential(result, given[0], real)
     else:
@@ -167,7 +169,9 @@ def _step(program: Program, place: int, real: Real) -> Iterator[str]:
 
 def _truth(program: Program, place: int, real: Real) -> str:
     step = program.steps[place]
-    return ("true" if step.arguments[0] else "false") if step.operation == "constant" else _operand(program, place, real)
+    return (
+        ("true" if step.arguments[0] else "false") if step.operation == "constant" else _operand(program, place, real)
+    )
 
 
 def _exponential(result: str, x: str, real: Real) -> Iterator[str]:

@@ -22,9 +22,7 @@ _library.define(
 _VALUE, _SLOPES = "torchbrdf::reflectance", "torchbrdf::reflectance_slopes"
 
 
-def _value(
-    form: int, normal: Tensor, light: Tensor, view: Tensor, material: Sequence[Tensor], checked: bool
-) -> Tensor:
+def _value(form: int, normal: Tensor, light: Tensor, view: Tensor, material: Sequence[Tensor], checked: bool) -> Tensor:
     kernel = form_at(form).kernel(material, normal.dtype)
     if kernel is None:
         return _formula(form, normal, light, view, material, checked)

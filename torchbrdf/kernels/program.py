@@ -55,7 +55,18 @@ class Program:
         return a if self.is_constant(b, 1.0) else self._folded("multiply", lambda x, y: x * y, a, b)
 
     def divide(self, a: int, b: int) -> int:
-        return a if self.is_constant(b, 1.0) else self.append("divide", a, b)
+        """a times 1/b: one division serves all that is divided by b, of which a derivative has three for each quotient.
+
+        One rounding more than a quotient has. 1/b overflows for |b| below the smallest normal number, which no guard
+        of `_numerics` lets below a fraction.
+        """
+        return self.multiply(a, self.reciprocal(b))
+
+    def reciprocal(self, a: int) -> int:
+        step = self.steps[a]
+        if step.operation == "constant" and step.arguments[0]:
+            return self.constant(1 / step.arguments[0])
+        return self.append("reciprocal", a)
 
     def negate(self, a: int) -> int:
         return self.append("negate", a)

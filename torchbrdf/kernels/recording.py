@@ -191,8 +191,7 @@ def _power(p: Program, x: int, exponent: int) -> int:
 
 
 def _sigmoid(p: Program, x: int) -> int:
-    one = p.constant(1.0)
-    return p.divide(one, p.add(one, p.append("exp", p.negate(x))))
+    return p.reciprocal(p.add(p.constant(1.0), p.append("exp", p.negate(x))))
 
 
 def _scaled(p: Program, x: int, factor: int | None) -> int:
@@ -238,9 +237,7 @@ def _selected(p: Program, part: np.ndarray, size: Sequence[int], dim: int, index
     return _placed(p, np.expand_dims(part, dim), size, dim, slice(first, first + 1))
 
 
-def _sliced(
-    p: Program, part: np.ndarray, size: Sequence[int], dim: int, start: int, end: int, step: int
-) -> np.ndarray:
+def _sliced(p: Program, part: np.ndarray, size: Sequence[int], dim: int, start: int, end: int, step: int) -> np.ndarray:
     return _placed(p, part, size, dim, slice(start, end, step))
 
 
@@ -275,8 +272,8 @@ ELEMENTWISE: dict[str, Rule] = {
     "neg": Program.negate,
     "abs": lambda p, x: p.append("abs", x),
     "sqrt": lambda p, x: p.append("sqrt", x),
-    "rsqrt": lambda p, x: p.divide(p.constant(1.0), p.append("sqrt", x)),
-    "reciprocal": lambda p, x: p.divide(p.constant(1.0), x),
+    "rsqrt": lambda p, x: p.reciprocal(p.append("sqrt", x)),
+    "reciprocal": Program.reciprocal,
     "addcmul": lambda p, x, a, b, value=None: p.add(x, p.multiply(_scaled(p, a, value), b)),
     "pow": _power,
     "exp": lambda p, x: p.append("exp", x),

@@ -29,7 +29,7 @@ def text_and_divisions(dtype, wanted):
     arrays = [Stream(3)] * 4 + [Stream(1)] + ([] if wanted == "value" else [Stream(3)])
     truth = pixel.unit if wanted == "value" else None
     needed = pixel.program.needed_for(itertools.chain(*outputs))
-    divisions = sum(pixel.program.steps[k].operation == "divide" for k in needed)
+    divisions = sum(pixel.program.steps[k].operation == "reciprocal" for k in needed)
     return lower(pixel.program, arrays, outputs, dtype, truth=truth), divisions
 
 

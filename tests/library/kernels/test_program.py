@@ -34,6 +34,14 @@ def test_neutral_terms_and_factors_vanish():
     assert len(program.steps) == before
 
 
+def test_what_is_divided_by_one_number_is_divided_once():
+    program, x, y = two_inputs()
+    program.divide(x, y), program.divide(program.divide(y, y), y)
+    assert [step.operation for step in program.steps].count("reciprocal") == 1
+    third = program.reciprocal(program.constant(3.0))
+    assert program.steps[third] == Step("constant", (1 / 3,))
+
+
 def test_zero_times_something_is_kept_for_the_sake_of_nan():
     program, x, _ = two_inputs()
     place = program.multiply(program.constant(0.0), x)
