@@ -2,9 +2,9 @@
 
 import pytest
 import torch
-from helpers.probes import seeded
 
-from torchbrdf import EON, BRDF, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar
+from helpers.probes import seeded
+from torchbrdf import BRDF, EON, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar
 from torchbrdf.kernels.forms import form_for
 from torchbrdf.kernels.machine import is_installed
 
@@ -97,7 +97,7 @@ EVALUATED = {
     "or": lambda x, m: (x[0].bool() | x[1].bool(), m[0]),
     "not": lambda x, m: (~x[0].bool(), m[0]),
     **{
-        name: (lambda x, m, compare=getattr(torch, name): (compare(x[0], x[1]), m[0]))
-        for name in ("lt", "le", "gt", "ge", "eq", "ne")
+        compare.__name__: (lambda x, m, compare=compare: (compare(x[0], x[1]), m[0]))
+        for compare in (torch.lt, torch.le, torch.gt, torch.ge, torch.eq, torch.ne)
     },
 }

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -58,10 +59,10 @@ def by_kernel(model: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> Tenso
         return None
     if not is_installed() or form.kernel(material, normal.dtype) is None:
         return None
-    return reflectance(form.place, normal, light, view, material, checked=True)
+    return reflectance(form.place, arrays, checked=True)
 
 
-def _is_plain(tensor: object) -> bool:
+def _is_plain(tensor: Any) -> bool:
     """Whether it is an array of numbers in the computer's memory, and no subclass that stands for something else."""
     if type(tensor) not in {Tensor, nn.Parameter}:
         return False
@@ -72,6 +73,6 @@ def _is_transformed() -> bool:
     """Whether operations are watched, mapped or differentiated forward: what happens to them is then not only here."""
     return (
         _get_current_dispatch_mode() is not None
-        or torch._C._functorch.peek_interpreter_stack() is not None
+        or torch._C._functorch.peek_interpreter_stack() is not None  # pyright: ignore[reportAttributeAccessIssue]
         or forward_ad._current_level >= 0
     )

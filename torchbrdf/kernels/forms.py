@@ -75,8 +75,8 @@ class Form:
         vectors = torch.nn.functional.normalize(vectors, dim=-1).to(dtype)
         material = [torch.rand(size, generator=draw, dtype=torch.float64).to(dtype) for size in sizes]
         with torch.no_grad():
-            together = self.formula(*vectors, material)
-            apart = [self.formula(*vectors[:, k], material) for k in range(_PIXELS)]
+            together = self.formula(vectors[0], vectors[1], vectors[2], material)
+            apart = [self.formula(n, s, v, material) for n, s, v in zip(*vectors, strict=True)]
         return torch.allclose(together, torch.stack(apart), rtol=_ALIKE, atol=_ALIKE, equal_nan=True)
 
 

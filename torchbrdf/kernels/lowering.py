@@ -1,6 +1,6 @@
 """Programs of one pixel as loops over pixels, in the text of LLVM's intermediate representation.
 
-Of the liberties a compiler may take with floating point it has one, `contract`: a product and a sum may be rounded once.
+Of the liberties a compiler may take with floating point it has one, `contract`: product and sum may be rounded once.
 Arrays are declared not to overlap (`noalias`); without that a loop over ten of them stays scalar.
 """
 

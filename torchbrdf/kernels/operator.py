@@ -1,6 +1,7 @@
 """The kernels as an operator of torch, `torchbrdf::reflectance`, which falls back to the formula where it must.
 
 Under vmap, on other devices than a CPU, and for derivatives of derivatives it is the formula in torch operations.
+Its arrays are normal, light and view (..., 3), then the stored parameters of a model of the form.
 """
 
 from collections.abc import Sequence
@@ -12,63 +13,66 @@ from torch.library import Library
 
 from torchbrdf.directions import Cosines
 from torchbrdf.kernels.forms import form_at
+from torchbrdf.kernels.kernel import Kernel
 
-_ARRAYS = "int form, Tensor normal, Tensor light, Tensor view, Tensor[] material"
 _library = Library("torchbrdf", "DEF")
-_library.define(f"reflectance({_ARRAYS}, bool checked) -> Tensor", tags=(torch.Tag.pt2_compliant_tag,))
-_library.define(
-    f"reflectance_slopes({_ARRAYS}, Tensor weight, bool[] wanted) -> Tensor[]", tags=(torch.Tag.pt2_compliant_tag,)
-)
-_VALUE, _SLOPES = "torchbrdf::reflectance", "torchbrdf::reflectance_slopes"
+_ours = (torch.Tag.pt2_compliant_tag,)
+_library.define("reflectance(int form, Tensor[] arrays, bool checked) -> Tensor", tags=_ours)
+_library.define("reflectance_slopes(int form, Tensor[] arrays, Tensor weight, bool[] wanted) -> Tensor[]", tags=_ours)
 
 
-def _value(form: int, normal: Tensor, light: Tensor, view: Tensor, material: Sequence[Tensor], checked: bool) -> Tensor:
-    kernel = form_at(form).kernel(material, normal.dtype)
-    if kernel is None:
-        return _formula(form, normal, light, view, material, checked)
-    value, off = kernel.value([normal, light, view, *material])
-    if checked and off:
-        Cosines.of(normal, light, view)  # says what is off, and has the last word on whether anything is
-    return value
+def reflectance(form: int, arrays: Sequence[Tensor], *, checked: bool) -> Tensor:
+    """f_r (..., channel) [1/sr] of a form of models.
+
+    Raises what `Cosines.of` raises where vectors are `checked` and not of unit length.
+    """
+    return torch.ops.torchbrdf.reflectance(form, list(arrays), checked)
 
 
-def _formula(
-    form: int, normal: Tensor, light: Tensor, view: Tensor, material: Sequence[Tensor], checked: bool
-) -> Tensor:
+def _formula(form: int, arrays: Sequence[Tensor], checked: bool = False) -> Tensor:
+    normal, light, view, *material = arrays
     if checked:
         Cosines.of(normal, light, view)
     return form_at(form).formula(normal, light, view, material)
 
 
-def _slopes(
-    form: int,
-    normal: Tensor,
-    light: Tensor,
-    view: Tensor,
-    material: Sequence[Tensor],
-    weight: Tensor,
-    wanted: Sequence[bool],
-) -> list[Tensor]:
+def _kernel(form: int, arrays: Sequence[Tensor]) -> Kernel | None:
+    first, _, _, *material = arrays
+    return form_at(form).kernel(material, first.dtype) if first.device.type == "cpu" else None
+
+
+def _value(form: int, arrays: Sequence[Tensor], checked: bool) -> Tensor:
+    kernel = _kernel(form, arrays)
+    if kernel is None:
+        return _formula(form, arrays, checked)
+    value, off = kernel.value(arrays)
+    if checked and off:
+        normal, light, view, *_ = arrays
+        Cosines.of(normal, light, view)  # says what is off, and has the last word on whether anything is
+    return value
+
+
+def _slopes(form: int, arrays: Sequence[Tensor], weight: Tensor, wanted: Sequence[bool]) -> list[Tensor]:
     """Derivatives of sum(weight * f_r) by the arrays that are wanted; nothing (0,) for the others."""
-    arrays = [normal, light, view, *material]
-    kernel = form_at(form).kernel(material, normal.dtype) if normal.device.type == "cpu" else None
-    if kernel is not None:
-        slopes = kernel.slopes(arrays, weight, wanted)
-    else:
+    kernel = _kernel(form, arrays)
+    if kernel is None:
         given = [t.detach().requires_grad_(want) for t, want in zip(arrays, wanted, strict=True)]
-        asked = iter(_by_formula(form, given, weight, wanted, again=False))
-        slopes = [next(asked) if want else None for want in wanted]
-    return [normal.new_empty(0) if slope is None else slope for slope in slopes]
+        slopes = _by_formula(form, given, weight, wanted)
+    else:
+        slopes = kernel.slopes(arrays, weight, wanted)
+    return [weight.new_empty(0) if slope is None else slope for slope in slopes]
 
 
-def _by_formula(
-    form: int, arrays: Sequence[Tensor], weight: Tensor, wanted: Sequence[bool], *, again: bool
-) -> Sequence[Tensor]:
-    """Derivatives by the wanted arrays through the formula, `again` differentiable."""
+def _by_formula(form: int, arrays: Sequence[Tensor], weight: Tensor, wanted: Sequence[bool]) -> Sequence[Tensor | None]:
+    """Derivatives by the wanted arrays through the formula; differentiable in turn where gradients are recorded."""
+    again = torch.is_grad_enabled()
     with torch.enable_grad():
-        value = form_at(form).formula(*arrays[:3], arrays[3:])
+        value = _formula(form, arrays)
     asked = [t for t, want in zip(arrays, wanted, strict=True) if want]
-    return torch.autograd.grad(value, asked, weight, create_graph=again, allow_unused=True, materialize_grads=True)
+    slopes = iter(
+        torch.autograd.grad(value, asked, weight, create_graph=again, allow_unused=True, materialize_grads=True)
+    )
+    return [next(slopes) if want else None for want in wanted]
 
 
 class _Reflectance(torch.autograd.Function):
@@ -79,57 +83,33 @@ class _Reflectance(torch.autograd.Function):
         ctx.form = form
         ctx.save_for_backward(*arrays)
         with torch._C._AutoDispatchBelowAutograd():
-            return torch.ops.torchbrdf.reflectance(form, *arrays[:3], arrays[3:], checked)
+            return torch.ops.torchbrdf.reflectance(form, arrays, checked)
 
     @staticmethod
-    def backward(ctx: Any, weight: Tensor) -> tuple[Tensor | None, ...]:
+    def backward(ctx: Any, *weights: Tensor) -> tuple[Tensor | None, ...]:
         arrays, wanted = ctx.saved_tensors, list(ctx.needs_input_grad[2:])
         if torch.is_grad_enabled():  # the derivatives will be differentiated in turn
-            asked = iter(_by_formula(ctx.form, arrays, weight, wanted, again=True))
-            return None, None, *(next(asked) if want else None for want in wanted)
-        made = torch.ops.torchbrdf.reflectance_slopes(ctx.form, *arrays[:3], arrays[3:], weight, wanted)
+            return None, None, *_by_formula(ctx.form, arrays, weights[0], wanted)
+        made = torch.ops.torchbrdf.reflectance_slopes(ctx.form, arrays, weights[0], wanted)
         return None, None, *(slope if want else None for slope, want in zip(made, wanted, strict=True))
 
 
-def _differentiable(
-    form: int, normal: Tensor, light: Tensor, view: Tensor, material: Sequence[Tensor], checked: bool
-) -> Any:
-    return _Reflectance.apply(form, checked, normal, light, view, *material)
+def _differentiable(form: int, arrays: Sequence[Tensor], checked: bool) -> Any:
+    return _Reflectance.apply(form, checked, *arrays)
 
 
-def _unlooked_at(
-    form: int, normal: Tensor, light: Tensor, view: Tensor, material: Sequence[Tensor], checked: bool
-) -> Tensor:
-    return form_at(form).formula(normal, light, view, material)
+def _unlooked_at(form: int, arrays: Sequence[Tensor], checked: bool) -> Tensor:
+    return _formula(form, arrays)
 
 
-def _slopes_without_numbers(
-    form: int,
-    normal: Tensor,
-    light: Tensor,
-    view: Tensor,
-    material: Sequence[Tensor],
-    weight: Tensor,
-    wanted: Sequence[bool],
-) -> list[Tensor]:
-    arrays = (normal, light, view, *material)
-    return [torch.empty_like(t) if want else normal.new_empty(0) for t, want in zip(arrays, wanted, strict=True)]
+def _shapes_of_slopes(form: int, arrays: Sequence[Tensor], weight: Tensor, wanted: Sequence[bool]) -> list[Tensor]:
+    return [torch.empty_like(t) if want else weight.new_empty(0) for t, want in zip(arrays, wanted, strict=True)]
 
 
 _library.impl("reflectance", _value, "CPU")
 _library.impl("reflectance", _formula, "CUDA")
-_library.impl("reflectance", _unlooked_at, "FuncTorchBatched")
 _library.impl("reflectance", _differentiable, "Autograd")
+_library.impl("reflectance", _unlooked_at, "FuncTorchBatched")
 _library.impl("reflectance_slopes", _slopes, "CompositeExplicitAutograd")
-torch.library.register_fake(_VALUE, _unlooked_at, lib=_library)
-torch.library.register_fake(_SLOPES, _slopes_without_numbers, lib=_library)
-
-
-def reflectance(
-    form: int, normal: Tensor, light: Tensor, view: Tensor, material: Sequence[Tensor], *, checked: bool
-) -> Tensor:
-    """f_r (..., channel) [1/sr] of a form of models with stored tensors.
-
-    Raises what `Cosines.of` raises where vectors are `checked` and not of unit length.
-    """
-    return torch.ops.torchbrdf.reflectance(form, normal, light, view, list(material), checked)
+torch.library.register_fake("torchbrdf::reflectance", _unlooked_at, lib=_library)
+torch.library.register_fake("torchbrdf::reflectance_slopes", _shapes_of_slopes, lib=_library)

@@ -12,7 +12,7 @@ from torchbrdf._numerics import dot, unit_tolerance
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.kernels.program import Program
-from torchbrdf.kernels.recording import CannotRecord, Recorder
+from torchbrdf.kernels.recording import Recorder, RecordingError
 from torchbrdf.parameters import Parametric, declared
 
 # Directions and a raw parameter at which nothing happens to be 0 or 1 while a formula is recorded.
@@ -96,7 +96,7 @@ def formula(model: BRDF, tensors: Sequence[Tensor], normal: Tensor, light: Tenso
 def record(model: BRDF, sizes: Sequence[tuple[int, ...]], dtype: torch.dtype) -> Pixel:
     """The program of a model whose stored parameters have these sizes at a pixel.
 
-    Raises CannotRecord where the formula takes operations that have no scalar steps.
+    Raises RecordingError where the formula takes operations that have no scalar steps.
     """
     recorder = Recorder(dtype)
     vectors = [torch.tensor(v, dtype=dtype) for v in _SOMEWHERE]
@@ -108,7 +108,7 @@ def record(model: BRDF, sizes: Sequence[tuple[int, ...]], dtype: torch.dtype) ->
         x, y, z = (off <= unit_tolerance(dtype)).unbind()
         unit = x & y & z
     if value.ndim != 1:
-        raise CannotRecord(f"a value of shape {tuple(value.shape)} at a pixel")
+        raise RecordingError(f"a value of shape {tuple(value.shape)} at a pixel")
     weight = recorder.input(torch.full_like(value, 0.7, requires_grad=False))
     with recorder:
         slopes = torch.autograd.grad(value, given, weight, allow_unused=True, materialize_grads=True)

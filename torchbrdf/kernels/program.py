@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-
 COMPARISONS = ("lt", "le", "gt", "ge", "eq", "ne")
 TRUTHS = frozenset((*COMPARISONS, "and", "or", "not"))
 

@@ -19,7 +19,7 @@ from torchbrdf.kernels.program import COMPARISONS, Program
 Rule = Callable[..., int]
 
 
-class CannotRecord(Exception):
+class RecordingError(Exception):
     """The formula does something that has no scalar steps, or that depends on numbers it read."""
 
 
@@ -63,7 +63,7 @@ class Recorder(TorchDispatchMode):
         outputs = [t for t in _flat((made,)) if isinstance(t, Tensor)]
         self._kept += outputs
         if len(outputs) == 0:
-            raise CannotRecord(f"{name} reads numbers")
+            raise RecordingError(f"{name} reads numbers")
         if name in RESHAPED_IN_PLACE:
             pass
         elif before is not None:
@@ -77,7 +77,7 @@ class Recorder(TorchDispatchMode):
                 self._write(t, self._numbers(t))
         else:
             if outputs[0].dtype != (torch.bool if name in TRUTHFUL else self.dtype):
-                raise CannotRecord(f"{name} makes {outputs[0].dtype}")
+                raise RecordingError(f"{name} makes {outputs[0].dtype}")
             self._write(outputs[0], self._evaluate(name, args, kwargs, self._read))
         return made
 
@@ -93,7 +93,7 @@ class Recorder(TorchDispatchMode):
         if name in WHOLE:
             return WHOLE[name](self.program, *arguments, **kwargs)
         if name not in ELEMENTWISE:
-            raise CannotRecord(f"no scalar steps for {name}")
+            raise RecordingError(f"no scalar steps for {name}")
         rule, constant = ELEMENTWISE[name], self.program.constant
         arguments = [np.array(constant(float(x)), dtype=object) if _is_number(x) else x for x in arguments]
         options = {k: constant(float(v)) for k, v in kwargs.items() if _is_number(v)}
@@ -183,7 +183,7 @@ def _sign(p: Program, x: int) -> int:
 def _power(p: Program, x: int, exponent: int) -> int:
     operation, (power, *_) = p.steps[exponent]
     if operation != "constant" or power != int(power) or not 0 < power < 9:
-        raise CannotRecord("a power other than a small whole one")
+        raise RecordingError("a power other than a small whole one")
     result = x
     for _ in range(int(power) - 1):
         result = p.multiply(result, x)
@@ -237,8 +237,8 @@ def _selected(p: Program, part: np.ndarray, size: Sequence[int], dim: int, index
     return _placed(p, np.expand_dims(part, dim), size, dim, slice(first, first + 1))
 
 
-def _sliced(p: Program, part: np.ndarray, size: Sequence[int], dim: int, start: int, end: int, step: int) -> np.ndarray:
-    return _placed(p, part, size, dim, slice(start, end, step))
+def _sliced(p: Program, part: np.ndarray, size: Sequence[int], dim: int, *span: int) -> np.ndarray:
+    return _placed(p, part, size, dim, slice(*span))
 
 
 # Operations whose results depend on the shape of what they are given alone.

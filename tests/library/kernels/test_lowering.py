@@ -16,7 +16,8 @@ pytestmark = with_compiler
 REALS = [torch.float32, torch.float64]
 
 
-def run(program, inputs, outputs, dtype, arrays, pixels, truth=None):
+def run(program, inputs, outputs, arrays, *, pixels, truth=None):
+    dtype = arrays[0].dtype
     results = [torch.full((pixels, len(places)), torch.nan, dtype=dtype) for places in outputs]
     loop = compiled(lower(program, inputs, outputs, dtype, truth=truth), len(inputs) + len(outputs))
     lapses = loop.call(*(t.data_ptr() for t in (*arrays, *results)), pixels)
@@ -47,7 +48,7 @@ def test_every_operation(dtype):
     g = torch.Generator().manual_seed(0)
     pairs = torch.randn(100, 2, generator=g, dtype=dtype)
     pairs[:10, 1] = pairs[:10, 0]
-    (got,), _ = run(p, [Stream(2)], [list(made.values())], dtype, [pairs], 100)
+    (got,), _ = run(p, [Stream(2)], [list(made.values())], [pairs], pixels=100)
     a, b = pairs.unbind(-1)
     seven = torch.full_like(a, 7.0)
     expected = [a + b, a - b, a * b, 1 / b, -a, a.abs(), a.abs().sqrt(), a.exp()]
@@ -64,7 +65,7 @@ def test_exponential_over_the_whole_range(dtype):
     end = 104.5 if dtype == torch.float32 else 747.0
     edges = [0.0, -0.0, 1e-9, -end, end, -math.inf, math.inf, math.nan, 88.7, -87.4, 0.34657, -0.34658]
     x = torch.cat((torch.tensor(edges, dtype=dtype), torch.linspace(-end, end, 4001, dtype=dtype)))
-    (got,), _ = run(p, [Stream(1)], [[exponential]], dtype, [x], len(x))
+    (got,), _ = run(p, [Stream(1)], [[exponential]], [x], pixels=len(x))
     with np.errstate(over="ignore", under="ignore"):
         expected = torch.from_numpy(np.exp(x.numpy().astype(np.longdouble)).astype(x.numpy().dtype))
     tiny = torch.finfo(dtype).tiny * torch.finfo(dtype).eps  # below the normal numbers, their spacing counts
@@ -77,7 +78,7 @@ def test_constants_keep_their_last_digit():
     values = [1 / 3, -math.pi, 1e-30, 0.1, -0.0, math.inf]
     places = [p.select(p.append("gt", x, p.constant(0.0)), p.constant(v), x) for v in values]
     for dtype in REALS:
-        (got,), _ = run(p, [Stream(1)], [places], dtype, [torch.ones(3, dtype=dtype)], 3)
+        (got,), _ = run(p, [Stream(1)], [places], [torch.ones(3, dtype=dtype)], pixels=3)
         assert torch.equal(got, torch.tensor(values, dtype=dtype).expand(3, -1))
 
 
@@ -88,7 +89,7 @@ def test_streams_repeat_or_advance_and_lapses_are_counted():
     pixels = 37
     pairs, three = torch.arange(2.0 * pixels).reshape(pixels, 2), torch.tensor([100.0, 200.0, 300.0])
     outputs = [[total], [x[4], x[0]]]
-    results, lapses = run(p, [Stream(2), Stream(3, True)], outputs, torch.float32, [pairs, three], pixels, truth=large)
+    results, lapses = run(p, [Stream(2), Stream(3, True)], outputs, [pairs, three], pixels=pixels, truth=large)
     assert torch.equal(results[0][:, 0], pairs.sum(-1) + 600)
     assert torch.equal(results[1], torch.stack((torch.full((pixels,), 300.0), pairs[:, 0]), -1))
     assert lapses == (pairs[:, 0] >= 10).sum()
@@ -98,5 +99,5 @@ def test_not_a_number_stays_one():
     p = Program()
     x = p.append("input", 0)
     places = [p.add(x, p.constant(1.0)), p.append("sqrt", x), p.append("exp", x), p.multiply(p.constant(0.0), x)]
-    (got,), _ = run(p, [Stream(1)], [places], torch.float32, [torch.full((20,), torch.nan)], 20)
+    (got,), _ = run(p, [Stream(1)], [places], [torch.full((20,), torch.nan)], pixels=20)
     assert got.isnan().all()

@@ -9,7 +9,7 @@ from torch.testing import assert_close
 from torchbrdf import EON, GGX, OrenNayar, QualitativeOrenNayar, fixed
 from torchbrdf.fields import FieldBRDF
 from torchbrdf.kernels.pixel import form_of, formula, record, stored, with_stored
-from torchbrdf.kernels.recording import CannotRecord
+from torchbrdf.kernels.recording import RecordingError
 
 
 def test_stored_tensors_are_those_of_the_declared_parameters():
@@ -77,5 +77,5 @@ class Spread(FieldBRDF):
 
 
 def test_refuses_a_value_that_is_no_row_of_channels():
-    with pytest.raises(CannotRecord):
+    with pytest.raises(RecordingError):
         record(Spread(), [], torch.float64)
