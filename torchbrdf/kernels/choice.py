@@ -30,7 +30,7 @@ def native(smallest: float = 1) -> Iterator[None]:
     choice is a part of a program and the other choice returns after it, whatever happens; it holds for one thread (and
     asynchronous task) and does not disturb others.
 
-    >>> import torchbrdf
+    >>> import math, torchbrdf
     >>> with torchbrdf.native(math.inf):  # the formula alone
     ...     pass
     """
