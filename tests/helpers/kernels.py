@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from helpers.probes import seeded
-from torchbrdf import BRDF, EON, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar
+from torchbrdf import BRDF, EON, FastGaussianHeightfield, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar
 from torchbrdf.kernels.forms import form_for
 from torchbrdf.kernels.machine import is_installed
 
@@ -24,13 +24,19 @@ MODELS = {
 }
 
 
+# Networks, in which the sum of all terms is no measure: it grows from layer to layer without bound.
+NETWORKS = {
+    "fast heightfield": lambda albedo, rough: FastGaussianHeightfield(albedo=albedo, sigma=rough),
+}
+
+
 def made(name: str, pixels: int | None = None, dtype: torch.dtype = torch.float64) -> BRDF:
     """A model on a material per pixel, or on one for all."""
     lead = () if pixels is None else (pixels,)
     generator = seeded(1)
     rough = 0.05 + 0.9 * torch.rand(lead, generator=generator, dtype=torch.float64)
     albedo = 0.05 + 0.9 * torch.rand((*lead, 3), generator=generator, dtype=torch.float64)
-    return MODELS[name](albedo.to(dtype), rough.to(dtype))
+    return (MODELS | NETWORKS)[name](albedo.to(dtype), rough.to(dtype))
 
 
 def frames(pixels: int, dtype: torch.dtype = torch.float64, seed: int = 0) -> list[torch.Tensor]:
@@ -91,6 +97,8 @@ EVALUATED = {
     "negate": lambda x, m: (-x[0], m[0]),
     "abs": lambda x, m: (x[0].abs(), m[0]),
     "sqrt": lambda x, m: (x[0].sqrt(), m[0] / x[0].sqrt()),
+    "log": lambda x, m: (x[0].log(), m[0] / x[0].abs() + x[0].log().abs()),
+    "erfcx": lambda x, m: (torch.special.erfcx(x[0]), torch.special.erfcx(x[0]) * (1 + m[0])),
     "exp": lambda x, m: (x[0].exp(), x[0].exp() * (1 + m[0])),
     "select": lambda x, m: (torch.where(x[0].bool(), x[1], x[2]), torch.where(x[0].bool(), m[1], m[2])),
     "and": lambda x, m: (x[0].bool() & x[1].bool(), m[0]),

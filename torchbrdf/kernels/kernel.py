@@ -1,4 +1,4 @@
-"""Compiled loops of one model over arrays of pixels: value, and derivatives as far as they are asked for."""
+"""Loop loops of one model over arrays of pixels: value, and derivatives as far as they are asked for."""
 
 import math
 import os
@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from torchbrdf.kernels.lowering import Stream, lower
-from torchbrdf.kernels.machine import Compiled, compiled
+from torchbrdf.kernels.machine import Loop, compiled
 from torchbrdf.kernels.pixel import Pixel
 
 # Pixels below which a thread more takes longer to wake than it saves.
@@ -31,7 +31,7 @@ class Kernel:
         self.pixel = pixel
         self.sizes = tuple(sizes)
         self.dtype = dtype
-        self._loops: dict[tuple[tuple[bool, ...], tuple[bool, ...]], Compiled] = {}
+        self._loops: dict[tuple[tuple[bool, ...], tuple[bool, ...]], Loop] = {}
         self._lock = threading.Lock()
 
     def value(self, arrays: Sequence[Tensor]) -> tuple[Tensor, int]:
@@ -62,14 +62,14 @@ class Kernel:
         shapes = [array.shape[: array.ndim - len(size)] for array, size in zip(arrays, self.sizes, strict=True)]
         return common_shape(shapes)
 
-    def loop(self, repeated: tuple[bool, ...], wanted: tuple[bool, ...]) -> Compiled:
+    def loop(self, repeated: tuple[bool, ...], wanted: tuple[bool, ...]) -> Loop:
         """The loop over arrays of which some are the same for all pixels; no array wanted is the value."""
         with self._lock:
             if (repeated, wanted) not in self._loops:
                 self._loops[repeated, wanted] = self._compile(repeated, wanted)
         return self._loops[repeated, wanted]
 
-    def _compile(self, repeated: tuple[bool, ...], wanted: tuple[bool, ...]) -> Compiled:
+    def _compile(self, repeated: tuple[bool, ...], wanted: tuple[bool, ...]) -> Loop:
         p = self.pixel
         inputs = [Stream(math.prod(size), same) for size, same in zip(self.sizes, repeated, strict=True)]
         if not wanted:
@@ -88,7 +88,7 @@ class Kernel:
         return rows, repeated
 
     def _run(
-        self, loop: Compiled, rows: Sequence[Tensor], repeated: Sequence[bool], results: Sequence[Tensor], pixels: int
+        self, loop: Loop, rows: Sequence[Tensor], repeated: Sequence[bool], results: Sequence[Tensor], pixels: int
     ) -> int:
         if pixels == 0:
             return 0
@@ -97,12 +97,12 @@ class Kernel:
         starts = [array.data_ptr() for array in (*rows, *results)]
         threads = min(torch.get_num_threads(), -(-pixels // _PIXELS_A_THREAD))
         if threads == 1:
-            return loop.call(*starts, pixels)
+            return loop(*starts, pixels)
         share = -(-pixels // threads)
 
         def part(first: int) -> int:
             addresses = (start + first * step for start, step in zip(starts, bytes_a_pixel, strict=True))
-            return loop.call(*addresses, min(share, pixels - first))
+            return loop(*addresses, min(share, pixels - first))
 
         own, *others = range(0, pixels, share)
         waiting = [_threads(os.getpid()).submit(part, first) for first in others]

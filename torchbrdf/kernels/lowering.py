@@ -4,45 +4,18 @@ Of the liberties a compiler may take with floating point it has one, `contract`:
 Arrays are declared not to overlap (`noalias`); without that a loop over ten of them stays scalar.
 """
 
-import math
-import struct
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import torch
 
+from torchbrdf.kernels.elementary import ELEMENTARY, REALS, Real, literal
 from torchbrdf.kernels.program import COMPARISONS, TRUTHS, Program
 
 _BINARY = {"add": "fadd", "subtract": "fsub", "multiply": "fmul"}
 _INTRINSIC = {"abs": "fabs", "sqrt": "sqrt"}
 _CONDITION = {"lt": "olt", "le": "ole", "gt": "ogt", "ge": "oge", "eq": "oeq", "ne": "une"}
-ARITHMETIC = frozenset((*_BINARY, *_INTRINSIC, *TRUTHS, "negate", "reciprocal", "select", "exp"))
-
-
-class Real(NamedTuple):
-    """A floating-point type as LLVM knows it.
-
-    Attributes:
-        name: of the type.
-        bits: of a number.
-        mantissa: stored bits of the mantissa.
-        bias: of the exponent.
-        terms: of the exponential series up to log(2)/2, until the next changes nothing.
-        steepest: exponents between which exp is neither 0 nor infinite.
-    """
-
-    name: str
-    bits: int
-    mantissa: int
-    bias: int
-    terms: int
-    steepest: tuple[float, float]
-
-
-REALS = {
-    torch.float32: Real("float", 32, 23, 127, 8, (-104.0, 89.0)),
-    torch.float64: Real("double", 64, 52, 1023, 14, (-746.0, 710.0)),
-}
+ARITHMETIC = frozenset((*_BINARY, *_INTRINSIC, *TRUTHS, *ELEMENTARY, "negate", "reciprocal", "select"))
 
 
 class Stream(NamedTuple):
@@ -129,14 +102,7 @@ def _store(real: Real, value: str, array: str, index: str) -> list[str]:
 
 def _operand(program: Program, place: int, real: Real) -> str:
     step = program.steps[place]
-    return _literal(step.arguments[0], real) if step.operation == "constant" else f"%v{place}"
-
-
-def _literal(value: float, real: Real) -> str:
-    """The number nearest to a value: LLVM writes both types by the bits of a double."""
-    if real.bits == 32 and math.isfinite(value):
-        value = struct.unpack("f", struct.pack("f", value))[0]
-    return f"0x{struct.unpack('>Q', struct.pack('>d', value))[0]:016X}"
+    return literal(step.arguments[0], real) if step.operation == "constant" else f"%v{place}"
 
 
 def _step(program: Program, place: int, real: Real) -> Iterator[str]:
@@ -154,9 +120,9 @@ def _step(program: Program, place: int, real: Real) -> Iterator[str]:
     elif operation == "negate":
         yield f"{result} = fneg {kind} {given[0]}"
     elif operation == "reciprocal":
-        yield f"{result} = fdiv {kind} {_literal(1.0, real)}, {given[0]}"
-    elif operation == "exp":
-        yield from _exponential(result, given[0], real)
+        yield f"{result} = fdiv {kind} {literal(1.0, real)}, {given[0]}"
+    elif operation in ELEMENTARY:
+        yield from ELEMENTARY[operation](result, given[0], real)
     else:
         truths = [_truth(program, int(k), real) for k in arguments]
         if operation == "select":
@@ -169,44 +135,6 @@ def _step(program: Program, place: int, real: Real) -> Iterator[str]:
 
 def _truth(program: Program, place: int, real: Real) -> str:
     step = program.steps[place]
-    return (
-        ("true" if step.arguments[0] else "false") if step.operation == "constant" else _operand(program, place, real)
-    )
-
-
-def _exponential(result: str, x: str, real: Real) -> Iterator[str]:
-    """2^n times the exponential series of the rest, which vectorises as calls of a library do not."""
-    kind, whole = real.name, f"i{real.bits}"
-    low, high = (_literal(end, real) for end in real.steepest)
-    # log(2) in two parts: n times the first is exact
-    coarse = math.floor(math.log(2) * 2**9) / 2**9 if real.bits == 32 else float.fromhex("0x1.62e42feep-1")
-    fine = math.log(2) - coarse if real.bits == 32 else float.fromhex("0x1.a39ef35793c76p-33")
-    magic = 1.5 * 2.0**real.mantissa  # a sum with it is rounded to a whole number, which its last bits hold
-    shown = struct.unpack("q", struct.pack("d", magic))[0] if real.bits == 64 else 0x4B400000
-    yield f"{result}_above = fcmp olt {kind} {x}, {low}"
-    yield f"{result}_a = select i1 {result}_above, {kind} {low}, {kind} {x}"
-    yield f"{result}_below = fcmp ogt {kind} {result}_a, {high}"
-    yield f"{result}_x = select i1 {result}_below, {kind} {high}, {kind} {result}_a"
-    yield f"{result}_scaled = fmul {kind} {result}_x, {_literal(1 / math.log(2), real)}"
-    yield f"{result}_t = fadd {kind} {result}_scaled, {_literal(magic, real)}"
-    yield f"{result}_n = fsub {kind} {result}_t, {_literal(magic, real)}"
-    yield f"{result}_c = fmul contract {kind} {result}_n, {_literal(coarse, real)}"
-    yield f"{result}_b = fsub contract {kind} {result}_x, {result}_c"
-    yield f"{result}_f = fmul contract {kind} {result}_n, {_literal(fine, real)}"
-    yield f"{result}_r = fsub contract {kind} {result}_b, {result}_f"
-    total = _literal(1 / math.factorial(real.terms - 1), real)
-    for k in range(real.terms - 2, -1, -1):
-        yield f"{result}_p{k} = fmul contract {kind} {total}, {result}_r"
-        yield f"{result}_s{k} = fadd contract {kind} {result}_p{k}, {_literal(1 / math.factorial(k), real)}"
-        total = f"{result}_s{k}"
-    # 2^n as a product of two, of which neither overflows
-    yield f"{result}_bits = bitcast {kind} {result}_t to {whole}"
-    yield f"{result}_whole = sub {whole} {result}_bits, {shown}"
-    yield f"{result}_h0 = ashr {whole} {result}_whole, 1"
-    yield f"{result}_h1 = sub {whole} {result}_whole, {result}_h0"
-    for k in (0, 1):
-        yield f"{result}_e{k} = add {whole} {result}_h{k}, {real.bias}"
-        yield f"{result}_m{k} = shl {whole} {result}_e{k}, {real.mantissa}"
-        yield f"{result}_w{k} = bitcast {whole} {result}_m{k} to {kind}"
-    yield f"{result}_y = fmul {kind} {total}, {result}_w0"
-    yield f"{result} = fmul {kind} {result}_y, {result}_w1"
+    if step.operation == "constant":
+        return "true" if step.arguments[0] else "false"
+    return _operand(program, place, real)

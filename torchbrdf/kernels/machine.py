@@ -4,22 +4,12 @@ import ctypes
 import importlib
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any
 
 _OLDEST_LLVM = (20, 0, 0)  # of llvmlite 0.45
 
 
-class Compiled(NamedTuple):
-    """A function of the processor.
-
-    Attributes:
-        call: with the addresses of its arrays and the number of pixels; without Python's lock, so that threads do not
-            wait for each other.
-        engine: owner of the code.
-    """
-
-    call: Callable[..., int]
-    engine: Any
+Loop = Callable[..., int]
 
 
 @cache
@@ -32,13 +22,18 @@ def is_installed() -> bool:
     return tuple(llvm.llvm_version_info) >= _OLDEST_LLVM
 
 
-def compiled(text: str, arrays: int) -> Compiled:
-    """The function `evaluate` of arrays and a number of pixels that a text defines."""
+def compiled(text: str, arrays: int) -> Loop:
+    """The function `evaluate` that a text defines: of the addresses of its arrays and the number of pixels.
+
+    It runs without Python's lock, so that threads do not wait for each other.
+    """
     llvm = importlib.import_module("llvmlite.binding")
     engine = llvm.create_mcjit_compiler(_optimised(text), _processor())
     engine.finalize_object()
     kind = ctypes.CFUNCTYPE(ctypes.c_int32, *(ctypes.c_void_p,) * arrays, ctypes.c_int64)
-    return Compiled(kind(engine.get_function_address("evaluate")), engine)
+    loop = kind(engine.get_function_address("evaluate"))
+    loop.engine = engine  # owns the code and must outlive it  # pyright: ignore[reportAttributeAccessIssue]
+    return loop
 
 
 def assembly_of(text: str) -> str:

@@ -194,6 +194,19 @@ def _sigmoid(p: Program, x: int) -> int:
     return p.reciprocal(p.add(p.constant(1.0), p.append("exp", p.negate(x))))
 
 
+def _log1p(p: Program, x: int) -> int:
+    """log(1 + x) with the digits of a small x, which 1 + x has lost: they are what the rounded sum differs by."""
+    rounded = p.add(p.constant(1.0), x)
+    lost = p.divide(p.subtract(x, p.subtract(rounded, p.constant(1.0))), rounded)
+    return p.add(p.append("log", rounded), p.select(p.append("eq", rounded, x), p.constant(0.0), lost))
+
+
+def _erfc(p: Program, x: int) -> int:
+    size = p.append("abs", x)
+    right = p.multiply(p.append("exp", p.negate(p.multiply(size, size))), p.append("erfcx", size))
+    return p.select(p.append("lt", x, p.constant(0.0)), p.subtract(p.constant(2.0), right), right)
+
+
 def _scaled(p: Program, x: int, factor: int | None) -> int:
     return x if factor is None else p.multiply(factor, x)
 
@@ -277,6 +290,9 @@ ELEMENTWISE: dict[str, Rule] = {
     "addcmul": lambda p, x, a, b, value=None: p.add(x, p.multiply(_scaled(p, a, value), b)),
     "pow": _power,
     "exp": lambda p, x: p.append("exp", x),
+    "log": lambda p, x: p.append("log", x),
+    "log1p": _log1p,
+    "erfc": _erfc,
     "sigmoid": _sigmoid,
     "sigmoid_backward": lambda p, g, y: p.multiply(g, p.multiply(y, p.subtract(p.constant(1.0), y))),
     "sign": _sign,
@@ -286,6 +302,7 @@ ELEMENTWISE: dict[str, Rule] = {
     "clamp": _clamp,
     "relu": lambda p, x: _kept_above(p, x, p.constant(0.0)),
     "threshold_backward": lambda p, g, x, t: p.select(p.append("gt", x, t), g, p.constant(0.0)),
+    "threshold": lambda p, x, t, value: p.select(p.append("gt", x, t), x, value),
     "where": Program.select,
     "masked_fill": lambda p, x, mask, value: p.select(mask, value, x),
     "clone": lambda p, x: x,

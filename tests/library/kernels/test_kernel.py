@@ -4,7 +4,7 @@ import threading
 
 import pytest
 import torch
-from helpers.kernels import MODELS, frames, kernel_of, made, sums_of_terms, with_compiler
+from helpers.kernels import MODELS, NETWORKS, frames, kernel_of, made, sums_of_terms, with_compiler
 from helpers.probes import seeded
 from torch.testing import assert_close
 
@@ -33,7 +33,7 @@ def by_formula(model, arrays, weight):
     return value.detach(), torch.autograd.grad(value, given, weight.double())
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", [*ALL, *(pytest.param(name, marks=pytest.mark.slow) for name in NETWORKS)])
 def test_float64_is_the_formula(name):
     model, kernel, arrays, weight = arrays_of(name, torch.float64)
     value, slopes = by_formula(model, arrays, weight)
@@ -66,6 +66,21 @@ def test_float32_is_within_1e6_of_the_sum_of_the_terms(name):
         assert (error <= 1e-6 * closest(places)).all()
         # where nothing cancels the terms are of the size of the sum: most of the time
         assert (error.sum(-1) <= 3e-6 * expected.reshape(PIXELS, -1).abs().sum(-1)).double().mean() > 0.85
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_float32_of_a_network_errs_as_the_formula_does(name):
+    model, kernel, arrays, weight = arrays_of(name, torch.float32)
+    value, slopes = by_formula(model, arrays, weight)
+    form = form_for(model)
+    assert form is not None
+    given = [t.clone().requires_grad_() for t in arrays]
+    eager = form.formula(given[0], given[1], given[2], given[3:])
+    by_torch = [eager.detach(), *torch.autograd.grad(eager, given, weight)]
+    by_kernel = [kernel.value(arrays)[0], *kernel.slopes(arrays, weight, [True] * 5)]
+    for mine, theirs, right in zip(by_kernel, by_torch, (value, *slopes), strict=True):
+        error, expected = ((t - right).square().mean().sqrt() for t in (mine, theirs))
+        assert error <= 1.5 * expected
 
 
 @pytest.mark.parametrize("single", [(0,), (1, 3), (2, 4)])
