@@ -1,6 +1,6 @@
 """Compiled kernels against the formula they come from and against the code that people write by hand.
 
-    OMP_NUM_THREADS=1 python examples/benchmarks/kernel.py [--pixels 1048576] [--repeats 15]
+    OMP_NUM_THREADS=1 python examples/benchmarks/kernel.py [--pixels 262144] [--repeats 15]
 
 Needs `pip install torchbrdf[fast]`. Float32, one thread unless stated, per-texel roughness and RGB albedo, which alone
 have gradients unless stated. Calls take turns, so that a slower minute slows them all; the shortest processor time
@@ -17,7 +17,15 @@ import torch
 from naive import naive_oren_nayar
 from torch import Tensor
 
-from torchbrdf import EON, FieldBRDF, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar, native
+from torchbrdf import (
+    EON,
+    FastGaussianHeightfield,
+    FieldBRDF,
+    FujiiOrenNayar,
+    OrenNayar,
+    QualitativeOrenNayar,
+    native,
+)
 
 FIRST_CALL = 4096  # pixels of the call that compiles
 Key = TypeVar("Key", bound=Hashable)
@@ -49,6 +57,7 @@ def models_of(x: Inputs) -> dict[str, FieldBRDF]:
         "QualitativeOrenNayar": QualitativeOrenNayar(albedo=x.albedo, sigma=x.rough),
         "FujiiOrenNayar": FujiiOrenNayar(albedo=x.albedo, roughness=x.rough),
         "EON": EON(albedo=x.albedo, roughness=x.rough),
+        "FastGaussianHeightfield": FastGaussianHeightfield(albedo=x.albedo, sigma=x.rough),
     }
 
 
@@ -98,7 +107,7 @@ def table(pixels: int, repeats: int) -> None:
         both[f"{name}, by directions too"] = both_of(model, [*given, *moving], moving, weight, smallest=1)
         forward[f"{name}, formula"] = forward_of(model, x.vectors, smallest=math.inf)
         both[f"{name}, formula"] = both_of(model, given, x.vectors, weight, smallest=math.inf)
-    # what forward and backward with derivatives by the material read and write: 16 + 24 numbers, half of each
+    # forward and backward with derivatives by the material read and write 36 numbers a pixel
     source, target = torch.rand(18, pixels), torch.empty(18, pixels)
     calls: dict[tuple[str, bool], Callable[[], object]] = {(name, False): call for name, call in forward.items()}
     calls |= {(name, True): call for name, call in both.items()}
@@ -145,7 +154,7 @@ def first_calls() -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pixels", type=int, default=1 << 20)
+    parser.add_argument("--pixels", type=int, default=1 << 18)
     parser.add_argument("--repeats", type=int, default=15)
     options = parser.parse_args()
     torch.set_num_threads(1)

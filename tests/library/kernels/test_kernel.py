@@ -68,6 +68,7 @@ def test_float32_is_within_1e6_of_the_sum_of_the_terms(name):
         assert (error.sum(-1) <= 3e-6 * expected.reshape(PIXELS, -1).abs().sum(-1)).double().mean() > 0.85
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NETWORKS)
 def test_float32_of_a_network_errs_as_the_formula_does(name):
     model, kernel, arrays, weight = arrays_of(name, torch.float32)
@@ -79,7 +80,8 @@ def test_float32_of_a_network_errs_as_the_formula_does(name):
     by_torch = [eager.detach(), *torch.autograd.grad(eager, given, weight)]
     by_kernel = [kernel.value(arrays)[0], *kernel.slopes(arrays, weight, [True] * 5)]
     for mine, theirs, right in zip(by_kernel, by_torch, (value, *slopes), strict=True):
-        error, expected = ((t - right).square().mean().sqrt() for t in (mine, theirs))
+        # all but the worst, of which few say little
+        error, expected = ((t - right).abs().reshape(-1).quantile(0.99) for t in (mine, theirs))
         assert error <= 1.5 * expected
 
 
