@@ -6,20 +6,43 @@ import logging
 import math
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from inverse.files import MAX_PIXELS, read_stack, write_stack
+from inverse.files import MAX_PIXELS, read_stack, whole_folder, write_stack
 from inverse.fitting import FitError, bootstrap, fit, usable
+from inverse.report import write_report
 from inverse.scene import Distant, Scene, Sensor, cylinder, plane, sphere, vase
 from inverse.transport import render
-from torchbrdf import BRDF, Lambert, OrenNayar, QualitativeOrenNayar, fixed
+from torchbrdf import (
+    BRDF,
+    FastGaussianHeightfield,
+    FastRoughSurface,
+    Lambert,
+    OrenNayar,
+    QualitativeOrenNayar,
+    RoughSurface,
+    fixed,
+)
 
-_ROUGH = {"qualitative": QualitativeOrenNayar, "oren-nayar": OrenNayar}
+_ROUGH: dict[str, Callable[..., BRDF]] = {
+    "qualitative": QualitativeOrenNayar,
+    "oren-nayar": OrenNayar,
+    "fast": FastRoughSurface,
+    "exact": RoughSurface,
+    "heightfield": FastGaussianHeightfield,
+}
+_SURFACES = (
+    "the V-cavities of Oren and Nayar: qualitative, oren-nayar (functional), fast (fitted, all bounces), exact (16 "
+    "slopes, all bounces: minutes); heightfield (fitted): sand, plaster, clay (%(default)s)"
+)
 _EXPOSURE = "image value per unit radiance; with pi, white that faces a light of irradiance 1 is full scale"
 _SHAPES = {"vase": vase, "sphere": sphere, "cylinder": cylinder, "plane": plane}
 
@@ -27,13 +50,14 @@ _SHAPES = {"vase": vase, "sphere": sphere, "cylinder": cylinder, "plane": plane}
 # What a scene of the command line takes at its peak, measured with all shapes, and what each image adds.
 _BYTES_A_PIXEL, _BYTES_AN_IMAGE_PIXEL = 950, 16
 _STEP = tuple[dict[str, Any], str]
-_INTERRUPTED = 130
+_DOUBTFUL, _INTERRUPTED = 3, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; 0 on success, otherwise one line on stderr and 2, or 130 after an interrupt.
 
-    What was finished by then is printed in any case.
+    What was finished by then is printed in any case. 3: printed as well, and not to be trusted: something was not
+    identified, or a warning stands.
     """
     options = _parser().parse_args(arguments)
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)  # what it logs comes as an error as well
@@ -42,6 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         for report, text in options.run(options):
             finished |= report
+            code = max(code, _DOUBTFUL if report.get("trusted") is False else 0)
             if not options.json:
                 _print(text)
     except (ValueError, OSError, FitError) as error:
@@ -56,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             _print(json.dumps(finished, indent=2, allow_nan=False))
         except OSError as error:
-            trouble, code = trouble or str(error), code or 2
+            trouble, code = trouble or str(error), 2
     if trouble:
         print("error:", " ".join(trouble.split()), file=sys.stderr)
     return code
@@ -114,7 +139,9 @@ def _add_fit(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(run=_fit)
     add = parser.add_argument
     add("folder", help="images and what is known of them, as `pydoc inverse.files.stacks` describes")
-    add("--model", choices=["lambert", *_ROUGH], default="oren-nayar")
+    add("--model", choices=["lambert", *_ROUGH], default="oren-nayar", help=_SURFACES)
+    add("--output", metavar="FOLDER", help="where to write the report, the result, maps and residuals")
+    add("--overwrite", action="store_true", help="replace an older report in the output folder")
     add("--albedo", choices=["single", "per-pixel"], default="single")
     add("--geometry", metavar="LINE", help='instead of geometry.txt, such as "sphere 244.5 144.5 108"')
     add("--images", metavar="PATTERN", help='image files, such as "gray.*.tga"')
@@ -171,8 +198,14 @@ def _fit(options: argparse.Namespace) -> Iterator[_STEP]:
         "valid": valid, "free_exposure": options.free_exposure, "free_ambient": options.free_ambient,
         "starts": options.starts,
     }  # fmt: skip
-    result = fit(scene, photos.images, model, seed=options.seed, **how)
-    yield {"images": list(photos.names), **result.to_json()}, str(result)
+    with _report_folder(options) as folder:
+        result = fit(scene, photos.images, model, seed=options.seed, **how)
+        if folder is not None:
+            write_report(folder, scene, photos.images, valid, result)
+    text = str(result)
+    if options.output:
+        text += f"\n{'written to':<14}{options.output}"
+    yield {"images": list(photos.names), "trusted": result.trusted, **result.to_json()}, text
     if options.bootstrap:
         spread = bootstrap(scene, photos.images, model, samples=options.bootstrap, seed=options.seed, **how)
         report: dict[str, Any] = {"samples": options.bootstrap}
@@ -184,6 +217,15 @@ def _fit(options: argparse.Namespace) -> Iterator[_STEP]:
             numbers = ", ".join(f"{k:.2g}" for k in shown.flatten().tolist())
             lines.append(f"{'bootstrap':<14}{name} +- {numbers}{' deg' if angle else ''}, {options.bootstrap} refits")
         yield {"bootstrap": report}, "\n".join(lines)
+
+
+def _report_folder(options: argparse.Namespace) -> AbstractContextManager[Path | None]:
+    """Where to write the report, refused before the fit rather than after it."""
+    if not options.output:
+        return nullcontext()
+    if find_spec("matplotlib") is None:
+        raise ValueError("--output draws a figure and needs matplotlib: pip install 'torchbrdf[plots]'.")
+    return whole_folder(Path(options.output), overwrite=options.overwrite, ours=lambda name: False)
 
 
 def _render(options: argparse.Namespace) -> Iterator[_STEP]:

@@ -26,7 +26,35 @@ _FARTHEST = {torch.float64: 30.0, torch.float32: 14.0}
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-12, 1e12
 _PROGRESS_AFTER_SECONDS = 2.0
 
-Residual = Callable[[Tensor, Tensor], Tensor]
+
+class Residuals:
+    """What is to be minimised: a function of (shared (G,), own (N, L)) with values (image, pixel, channel).
+
+    One whose derivatives can be had for less than a forward pass each overrides them.
+    """
+
+    def __init__(self, values: Callable[[Tensor, Tensor], Tensor]):
+        self._values = values
+
+    def __call__(self, shared: Tensor, own: Tensor) -> Tensor:
+        return self._values(shared, own)
+
+    def by_shared(self, shared: Tensor, own: Tensor) -> Tensor:
+        """Derivatives (G, image, pixel, channel)."""
+        still = torch.zeros_like(own)
+        columns = [self._along(shared, own, tangent, still) for tangent in torch.eye(len(shared)).to(shared)]
+        return torch.stack(columns)
+
+    def by_own(self, shared: Tensor, own: Tensor) -> Tensor:
+        """Derivatives (L, image, pixel, channel), each by the unknown of the pixel itself."""
+        still = torch.zeros_like(shared)
+        # one sweep moves this unknown of every pixel at once
+        tangents = [torch.zeros_like(own).index_fill(1, torch.tensor(k), 1.0) for k in range(own.shape[1])]
+        columns = [self._along(shared, own, still, tangent) for tangent in tangents]
+        return torch.stack(columns)
+
+    def _along(self, shared: Tensor, own: Tensor, d_shared: Tensor, d_own: Tensor) -> Tensor:
+        return torch.func.jvp(self, (shared, own), (d_shared, d_own))[1]
 
 
 @dataclass(frozen=True)
@@ -44,21 +72,11 @@ class NormalEquations:
     cost: float
 
     @classmethod
-    def of(cls, residual: Residual, shared: Tensor, own: Tensor) -> "NormalEquations":
+    def of(cls, residuals: Residuals, shared: Tensor, own: Tensor) -> "NormalEquations":
         """Linearise the residuals at (shared (G,), own (N, L))."""
-        r = residual(shared, own).double()
-        columns = []
-        for k in range(len(shared)):
-            tangent = torch.zeros_like(shared)
-            tangent[k] = 1
-            columns.append(_derivative(residual, shared, own, tangent, torch.zeros_like(own)))
-        by_shared = torch.stack(columns) if columns else r.new_zeros(0, *r.shape)
-        columns = []
-        for k in range(own.shape[1]):  # one sweep moves this unknown of every pixel at once
-            tangent = torch.zeros_like(own)
-            tangent[:, k] = 1
-            columns.append(_derivative(residual, shared, own, torch.zeros_like(shared), tangent))
-        by_own = torch.stack(columns) if columns else r.new_zeros(0, *r.shape)
+        r = residuals(shared, own).double()
+        by_shared = residuals.by_shared(shared, own).double() if len(shared) else r.new_zeros(0, *r.shape)
+        by_own = residuals.by_own(shared, own).double() if own.shape[1] else r.new_zeros(0, *r.shape)
         return cls(
             torch.einsum("ginc,hinc->gh", by_shared, by_shared),
             torch.einsum("ginc,linc->ngl", by_shared, by_own),
@@ -123,10 +141,10 @@ class Solution:
     history: list[float] = field(default_factory=list)
 
 
-def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int) -> Solution:
-    """Minimise the sum of squares of `residual(shared (G,), own (N, L)) -> (image, pixel, channel)`."""
+def minimise(residuals: Residuals, shared: Tensor, own: Tensor, *, max_steps: int) -> Solution:
+    """Minimise the sum of squares of residuals of (shared (G,), own (N, L))."""
     dtype = shared.dtype
-    equations = NormalEquations.of(residual, shared, own)
+    equations = NormalEquations.of(residuals, shared, own)
     reached = Solution(shared, own, "out of steps", f"not converged after {max_steps} steps", 0, equations)
     reached.history.append(equations.cost)
     if not torch.isfinite(torch.tensor(equations.cost)):
@@ -143,7 +161,7 @@ def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int)
             moved = ((new_shared - reached.shared).double(), (new_own - reached.own).double())
             decrease = reached.equations.predicted_decrease(*moved)
             length = max((d.abs().max().item() for d in moved if d.numel()), default=0.0)
-            cost = residual(new_shared, new_own).double().square().sum().item()
+            cost = residuals(new_shared, new_own).double().square().sum().item()
             small = 0 <= decrease <= COST_TOLERANCE[dtype] * reached.equations.cost
             negligible = small or length < STEP_TOLERANCE[dtype]
             if cost <= reached.equations.cost or negligible or damping > _MOST_DAMPING:
@@ -151,7 +169,7 @@ def minimise(residual: Residual, shared: Tensor, own: Tensor, *, max_steps: int)
             damping *= 4
         if cost <= reached.equations.cost:  # false for NaN
             reached.shared, reached.own = new_shared, new_own
-            reached.equations = NormalEquations.of(residual, new_shared, new_own)
+            reached.equations = NormalEquations.of(residuals, new_shared, new_own)
             damping = max(damping / 10, _LEAST_DAMPING)
         reached.history.append(reached.equations.cost)
         if negligible:
@@ -189,10 +207,6 @@ def _boxed_solution(matrix: Tensor, right: Tensor, limit: Tensor) -> Tensor:
         solution[worst] = solution[worst].sign() * limit[worst]
         free[worst] = False
     return solution
-
-
-def _derivative(residual: Residual, shared: Tensor, own: Tensor, d_shared: Tensor, d_own: Tensor) -> Tensor:
-    return torch.func.jvp(residual, (shared, own), (d_shared, d_own))[1].double()
 
 
 def scale(matrix: Tensor) -> Tensor:

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from inverse.files import Measurements
+from inverse.fitting.levenberg_marquardt import Residuals
 from inverse.fitting.photographs import best_of_starts, checked_model, judged
 from inverse.fitting.prediction import sample_predictor
 from inverse.fitting.result import FitResult
@@ -74,7 +75,9 @@ def fit_measurements(
         raw, _, _ = unknowns.unpack(shared, own)
         return (weighted_reflectance(cosines, predict(raw), knee) - target)[None]
 
-    best = best_of_starts(residual, unknowns, starts=starts, seed=seed, max_steps=max_steps)
+    best = best_of_starts(
+        Residuals(residual), unknowns.pack()[1], unknowns, starts=starts, seed=seed, max_steps=max_steps
+    )
     return judged(
         model, unknowns, best, samples=samples * values.shape[-1], unit="1/sr", throw=throw, began=began
     )  # fmt: skip

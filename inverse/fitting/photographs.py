@@ -8,8 +8,9 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from inverse.fitting.gram import condensed
 from inverse.fitting.identifiability import Covariance, judge
-from inverse.fitting.levenberg_marquardt import Residual, Solution, minimise
+from inverse.fitting.levenberg_marquardt import Residuals, Solution, minimise
 from inverse.fitting.misfit import warnings_of
 from inverse.fitting.prediction import predictor
 from inverse.fitting.result import FitResult
@@ -87,43 +88,51 @@ def fit(
         raw, exposure, ambient = unknowns.unpack(shared, own)
         return of_material(raw) * exposure[:, None, None] + ambient[:, None, None]
 
-    def residual_of(used: Tensor) -> Residual:
-        return lambda shared, own: (predict(shared, own) - recorded) * used
+    def problem_of(used: Tensor) -> tuple[Residuals, Tensor]:
+        """The residuals and the start values of each pixel's own unknowns."""
+        if of_material.basis is None or of_material.coefficients is None or unknowns.own_entries:
+            return Residuals(lambda shared, own: (predict(shared, own) - recorded) * used), unknowns.pack()[1]
+        return condensed(of_material.basis, of_material.coefficients, unknowns, recorded, used)
 
-    channels = predict(*unknowns.pack()).shape[-1]
+    channels = of_material.channels(unknowns.unpack(*unknowns.pack())[0])
     if channels not in (1, photographs.shape[-1]):
         raise ValueError(
             f"the photographs have {photographs.shape[-1]} channels, and model and lights {channels}. "
             "A per-texel albedo has shape (points, channel)."
         )
-    best = best_of_starts(residual_of(first_used), unknowns, starts=starts, seed=seed, max_steps=max_steps)
+    best = best_of_starts(*problem_of(first_used), unknowns, starts=starts, seed=seed, max_steps=max_steps)
     used = first_used
+    predicted = predict(best.shared, best.own).detach()
     for _ in range(_SELECTIONS):
         if best.status == "diverged":
             break
-        clear = clear_of_clipping(scene.sensor, recorded, predict(best.shared, best.own), first_used)
+        clear = clear_of_clipping(scene.sensor, recorded, predicted, first_used)
         if torch.equal(clear, used):
             break
         used, earlier = clear, best
-        best = minimise(residual_of(used), best.shared, best.own, max_steps=max_steps)
+        residuals, own = problem_of(used)
+        best = minimise(residuals, best.shared, best.own if best.own.numel() else own, max_steps=max_steps)
         best.iterations, best.history = best.iterations + earlier.iterations, earlier.history + best.history
+        predicted = predict(best.shared, best.own).detach()
     samples = int(used.sum())
-    predicted = predict(best.shared, best.own).detach()
+    # of the residuals themselves: in sums of products a perfect fit drowns in rounding
+    cost = ((predicted - recorded) * used).double().square().sum().item()
+    best.equations = replace(best.equations, cost=cost)
     unknown_values = len(best.shared) + best.own.numel()
     warnings = warnings_of(scene.sensor, predicted, predicted - recorded, used, unknown_values)
     return judged(
         model, unknowns, best, samples=samples, clipped=int(first_used.sum()) - samples, warnings=warnings,
-        unit="of full scale", throw=throw, began=began,
+        unit="of full scale", throw=throw, began=began, mask=scene.surface.mask if scene.surface.samples == 1 else None,
     )  # fmt: skip
 
 
 def best_of_starts(
-    residual: Residual, unknowns: Unknowns, *, starts: int, seed: int, max_steps: int
+    residuals: Residuals, own: Tensor, unknowns: Unknowns, *, starts: int, seed: int, max_steps: int
 ) -> Solution:  # fmt: skip
-    """The least sum of squares of `residual` over all starts."""
-    shared, own = unknowns.pack()
+    """The least sum of squares of the residuals over all starts of the shared unknowns."""
+    shared, _ = unknowns.pack()
     solutions = [
-        minimise(residual, start, own, max_steps=max_steps) for start in _starts(unknowns, shared, starts, seed)
+        minimise(residuals, start, own, max_steps=max_steps) for start in _starts(unknowns, shared, starts, seed)
     ]
     return min(solutions, key=lambda s: s.equations.cost if math.isfinite(s.equations.cost) else math.inf)
 
@@ -139,6 +148,7 @@ def judged(
     began: float,
     clipped: int = 0,
     warnings: tuple[str, ...] = (),
+    mask: Tensor | None = None,
 ) -> FitResult:
     """What a solution says; `model` receives the parameters found.
 
@@ -148,11 +158,12 @@ def judged(
         warnings: what the residuals say against it.
         unit: of the residuals.
         began: `time.perf_counter()` of the caller's start.
+        mask: of the result.
     Raises: FitError when it diverged, unless `throw` is false.
     """
     seconds = time.perf_counter() - began
     result = _result(unknowns, best, model, samples=samples, clipped=clipped, unit=unit, seconds=seconds)
-    result = replace(result, warnings=warnings)
+    result = replace(result, warnings=warnings, mask=mask)
     if result.status == "diverged" and throw:
         raise FitError(result)
     return result
@@ -238,4 +249,5 @@ def _result(
         model=model,
         history=best.history,
         residual_unit=unit,
+        mask=None,
     )

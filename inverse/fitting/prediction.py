@@ -6,12 +6,13 @@ is K multiply-adds a pixel.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
 
 from inverse.scene import Scene
-from inverse.transport import images_of
+from inverse.transport import Contraction, images_of
 from torchbrdf import BRDF, Cosines, LinearBRDF
 
 Predict = Callable[[dict[str, Tensor]], Tensor]
@@ -29,7 +30,30 @@ class _Call(nn.Module):
         return self.compute(self.model)
 
 
-def predictor(scene: Scene, model: BRDF, pixels: Tensor, *, per_texel: bool) -> Predict:
+@dataclass(frozen=True)
+class Prediction:
+    """Function from raw parameters to recorded values (image, P, channel).
+
+    Attributes:
+        basis, coefficients: where the values are images (image, P, 1 or channel, K) times coefficients (channel, K) of
+            raw parameters, and nothing else, those two.
+    """
+
+    values: Predict
+    basis: Tensor | None = None
+    coefficients: Predict | None = None
+
+    def __call__(self, raw: dict[str, Tensor]) -> Tensor:
+        return self.values(raw)
+
+    def channels(self, raw: dict[str, Tensor]) -> int:
+        """How many the recorded values have."""
+        if self.basis is None or self.coefficients is None:
+            return self.values(raw).shape[-1]
+        return max(self.basis.shape[2], self.coefficients(raw).shape[-2])
+
+
+def predictor(scene: Scene, model: BRDF, pixels: Tensor, *, per_texel: bool) -> Prediction:
     """Function from raw parameters (as in `model.named_parameters()`) to recorded values.
 
     Args:
@@ -54,7 +78,15 @@ def predictor(scene: Scene, model: BRDF, pixels: Tensor, *, per_texel: bool) -> 
 
     with torch.no_grad():
         images = images_of(footprints, scene.lights, record, linear=linear, texels=texels)
-    return _of_raw(model, images)
+    if linear is None or not isinstance(images, Contraction):
+        return Prediction(_of_raw(model, images))
+    return Prediction(_of_raw(model, images), images.basis, _of_raw(linear, coefficients_of))
+
+
+def coefficients_of(model: BRDF) -> Tensor:
+    """Those of a linear model."""
+    assert isinstance(model, LinearBRDF)
+    return model.coefficients()
 
 
 def sample_predictor(cosines: Cosines, model: BRDF) -> Predict:

@@ -1,8 +1,10 @@
 """What a fit returns."""
 
+import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any, TypeVar
 
 import torch
@@ -39,6 +41,8 @@ class FitResult:
         model: a fitted copy of the model.
         history: cost after each step.
         residual_unit: "of full scale" (of the sensor) for photographs, "1/sr" for measured reflectance.
+        mask: which pixels (rows, columns) the entries of a per-texel parameter belong to, in row-major order; None
+            where there are no photographs, or several points a pixel.
     """
 
     parameters: dict[str, Tensor]
@@ -59,6 +63,62 @@ class FitResult:
     model: BRDF
     history: list[float]
     residual_unit: str
+    mask: Tensor | None
+
+    @property
+    def trusted(self) -> bool:
+        """Whether it ended at a minimum that the data determine, and no warning stands. No proof: docs/fitting.md."""
+        return self.status in ("converged", "at bound") and not self.warnings
+
+    @property
+    def per_texel(self) -> tuple[str, ...]:
+        """Names of the parameters with a value for each point."""
+        shared = {_entry(label)[0] for label in self.names}
+        return tuple(name for name in self.parameters if name not in shared)
+
+    def image(self, name: str) -> Tensor:
+        """A parameter as an image (rows, columns, channel), NaN off the object; a shared one is the same all over it.
+
+        Raises: KeyError; ValueError without a mask.
+        """
+        return self._image(name, self.parameters[name])
+
+    def error_image(self, name: str) -> Tensor:
+        """The standard error of a parameter, as `image`; NaN also where a texel had no samples."""
+        return self._image(name, self.standard_error[name])
+
+    def _image(self, name: str, value: Tensor) -> Tensor:
+        if self.mask is None:
+            raise ValueError("a result has images when it is of photographs of a surface with one point a pixel.")
+        points = int(self.mask.sum())
+        rows = value.reshape(points, -1) if name in self.per_texel else value.reshape(1, -1).expand(points, -1)
+        image = rows.new_full((*self.mask.shape, rows.shape[1]), torch.nan)
+        image[self.mask] = rows
+        return image
+
+    def save(self, path: str | Path) -> None:
+        """Write everything but the model's class to a file for `load`: tensors, numbers and text, no code."""
+        content = {field.name: getattr(self, field.name) for field in fields(self)}
+        content |= {"angles": sorted(self.angles), "model": self.model.state_dict()}
+        torch.save(content, path)
+
+    @classmethod
+    def load(cls, path: str | Path, model: BRDF) -> "FitResult":
+        """What `save` wrote; a copy of `model`, one of the class that was fitted, takes the fitted parameters.
+
+        Raises: OSError; ValueError for a file that is no result, or one of another model.
+        """
+        if not Path(path).is_file():
+            raise OSError(f"{path}: no such file.")
+        try:
+            content = torch.load(path, weights_only=True)
+            model = copy.deepcopy(model)
+            model.load_state_dict(_shaped(model, content["model"]))
+            content |= {"angles": frozenset(content["angles"]), "model": model}
+            return cls(**content)
+        except Exception as error:  # torch raises what it meets
+            kind = type(model).__name__
+            raise ValueError(f"{path}: holds no result of {kind}: {error}") from error
 
     def __str__(self) -> str:
         rows = [("model", type(self.model).__name__)]
@@ -107,6 +167,14 @@ class FitResult:
         report["names"], report["correlation"] = self.names, _plain(self.correlation)
         report |= {"residual_rms": _plain(torch.tensor(self.residual_rms)), "samples": self.samples}
         return report | {"clipped": self.clipped, "iterations": self.iterations, "seconds": self.seconds}
+
+
+def _shaped(model: BRDF, state: dict[str, Tensor]) -> dict[str, Tensor]:
+    """The state; the model's parameters take its shapes and dtypes, which those of its start values need not have."""
+    for name, parameter in model.named_parameters():
+        if name in state:
+            parameter.data = state[name].clone()
+    return state
 
 
 def _entry(label: str) -> tuple[str, str]:

@@ -9,9 +9,10 @@ from inverse.transport.radiometry import (
     solid_angle_of_patch,
 )
 from inverse.transport.radiosity import why_no_interreflection
-from inverse.transport.rendering import images_of, radiance_of, render
+from inverse.transport.rendering import Contraction, images_of, radiance_of, render
 
 __all__ = [
+    "Contraction",
     "exitance",
     "images_of",
     "irradiance",

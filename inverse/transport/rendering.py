@@ -1,6 +1,7 @@
 """Radiance of a surface under lights, point by point and as images."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import torch
 from numpy.polynomial.legendre import leggauss
@@ -80,21 +81,32 @@ def _contraction(
     record: Values,
     linear: LinearBRDF,
     texels: Tensor | None,
-) -> Callable[[BRDF], Tensor]:
+) -> "Contraction":
     recorded = []
     for lights in light_sets:
         images = lit_basis(footprints, linear, lights)
         recorded.append(record(images.flatten(1)).unflatten(-1, images.shape[1:]))
-    basis = torch.stack(torch.broadcast_tensors(*recorded))  # (image, ..., 1 or channel, K)
+    return Contraction(torch.stack(torch.broadcast_tensors(*recorded)), texels)
 
-    def contracted(model: BRDF) -> Tensor:
+
+@dataclass(frozen=True)
+class Contraction:
+    """Function from a linear model to what is recorded of it (image, ..., channel): its images times its coefficients.
+
+    Attributes:
+        basis: the images as recorded (image, ..., 1 or channel, K).
+        texels: which points are recorded, for parameters per texel.
+    """
+
+    basis: Tensor
+    texels: Tensor | None = None
+
+    def __call__(self, model: BRDF) -> Tensor:
         assert isinstance(model, LinearBRDF)
         coefficients = model.coefficients()  # (channel, K), or (point, channel, K) if per texel
-        if coefficients.ndim > 2 and texels is not None:
-            coefficients = coefficients[texels]
-        return (basis * coefficients).sum(-1)
-
-    return contracted
+        if coefficients.ndim > 2 and self.texels is not None:
+            coefficients = coefficients[self.texels]
+        return (self.basis * coefficients).sum(-1)
 
 
 def _recorded_bounces(footprints: Footprints, lights: Sequence[Light], record: Values) -> Tensor:

@@ -8,7 +8,7 @@ import torch
 from helpers.photographs import LIGHTS, clay, photographed, scene_and_photographs
 
 from inverse import Distant, Scene, Sensor, fit, sphere, vase
-from inverse.fitting.levenberg_marquardt import NormalEquations, minimise
+from inverse.fitting.levenberg_marquardt import NormalEquations, Residuals, minimise
 from torchbrdf import OrenNayar, QualitativeOrenNayar
 
 D = torch.float64
@@ -83,7 +83,7 @@ def test_linear_problem_against_dense_algebra(pixels, shared, own):
     residual, dense, constant = linear_problem(pixels, shared, own)
     x, y = torch.zeros(shared, dtype=D), torch.zeros(pixels, own, dtype=D)
     wanted = torch.linalg.lstsq(dense, -constant[:, None]).solution[:, 0]
-    solved = minimise(residual, x, y, max_steps=50)
+    solved = minimise(Residuals(residual), x, y, max_steps=50)
     assert solved.status == "converged"
     torch.testing.assert_close(torch.cat((solved.shared, solved.own.flatten())), wanted, rtol=0, atol=1e-9)
     equations = solved.equations
@@ -98,7 +98,7 @@ def test_linear_problem_against_dense_algebra(pixels, shared, own):
 def test_predicted_decrease_of_a_linear_problem_is_exact():
     residual, _, _ = linear_problem(5, 2, 1)
     x, y = torch.zeros(2, dtype=D), torch.zeros(5, 1, dtype=D)
-    equations = NormalEquations.of(residual, x, y)
+    equations = NormalEquations.of(Residuals(residual), x, y)
     for damping in (0.0, 0.1, 10.0):
         dx, dy = equations.step(damping)
         fell = residual(x, y).square().sum() - residual(x + dx, y + dy).square().sum()
@@ -112,7 +112,9 @@ def test_a_bent_valley_is_followed_to_its_end():
         x, y = shared
         return torch.stack((10 * (y - x * x), 1 - x))[None, :, None]
 
-    solved = minimise(residual, torch.tensor([-1.2, 1.0], dtype=D), torch.zeros(2, 0, dtype=D), max_steps=100)
+    solved = minimise(
+        Residuals(residual), torch.tensor([-1.2, 1.0], dtype=D), torch.zeros(2, 0, dtype=D), max_steps=100
+    )
     assert solved.status == "converged"
     torch.testing.assert_close(solved.shared, torch.ones(2, dtype=D), rtol=0, atol=1e-8)
     assert all(later <= earlier for earlier, later in pairwise(solved.history))
