@@ -16,6 +16,8 @@ from torchbrdf.kernels.pixel import Pixel
 
 # Pixels below which a thread more takes longer to wake than it saves.
 _PIXELS_A_THREAD = 32768
+# Shares are multiples of what instructions work on at once, so that results are the same for any number of threads.
+_WHOLE = 64
 
 
 class Kernel:
@@ -98,7 +100,7 @@ class Kernel:
         threads = min(torch.get_num_threads(), -(-pixels // _PIXELS_A_THREAD))
         if threads == 1:
             return loop(*starts, pixels)
-        share = -(-pixels // threads)
+        share = -(-pixels // (threads * _WHOLE)) * _WHOLE
 
         def part(first: int) -> int:
             addresses = (start + first * step for start, step in zip(starts, bytes_a_pixel, strict=True))

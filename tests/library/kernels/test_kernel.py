@@ -140,8 +140,7 @@ def test_threads_share_the_pixels(monkeypatch):
     shared = kernel.value(arrays)[0], *kernel.slopes(arrays, weight, [True] * 5)
     monkeypatch.setattr(torch, "get_num_threads", lambda: 1)
     alone = kernel.value(arrays)[0], *kernel.slopes(arrays, weight, [True] * 5)
-    # the remainder of a share is not vectorised, and rounds differently
-    assert all(torch.allclose(a, b, rtol=1e-3, atol=1e-4) for a, b in zip(shared, alone, strict=True))
+    assert all(torch.equal(a, b) for a, b in zip(shared, alone, strict=True))
 
 
 def test_eight_threads_at_once(monkeypatch):
