@@ -14,6 +14,7 @@ import importlib
 import warnings
 
 from torchbrdf.brdf import BRDF, Option
+from torchbrdf.checks import unchecked
 from torchbrdf.directions import (
     Cosines,
     any_tangent,
@@ -74,12 +75,14 @@ from torchbrdf.models.he_torrance.reflectance import (
 )
 from torchbrdf.models.heightfield.anisotropic import AnisotropicGaussianHeightfield, anisotropic_gaussian_heightfield
 from torchbrdf.models.heightfield.fast import FastGaussianHeightfield, fast_gaussian_heightfield
+from torchbrdf.models.heightfield.neighbours import NEIGHBOURING_FACETS, NeighbouringFacets
 from torchbrdf.models.heightfield.roughness import (
     rms_slope_from_beckmann_alpha,
     rms_slope_from_sigma,
     sigma_from_rms_slope,
 )
 from torchbrdf.models.heightfield.surface import GaussianHeightfield, gaussian_heightfield
+from torchbrdf.models.heightfield.transport import INDEPENDENT_FACETS
 from torchbrdf.models.heightfield.visibility import MESHED_HEIGHTFIELD, SMOOTH_HEIGHTFIELD, HeightfieldConstants
 from torchbrdf.models.lambert import (
     Lambert,
@@ -220,6 +223,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Hapke",
     "HeTorrance",
     "HeightfieldConstants",
+    "INDEPENDENT_FACETS",
     "ImageBRDF",
     "Interval",
     "Lambert",
@@ -233,6 +237,8 @@ __all__ = [  # noqa: RUF022 - in plain order
     "Minnaert",
     "Mirror",
     "ModifiedPhong",
+    "NEIGHBOURING_FACETS",
+    "NeighbouringFacets",
     "Option",
     "OrenNayar",
     "Oriented",
@@ -296,6 +302,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "tabulated_weights",
     "torrance_sparrow",
     "trainable",
+    "unchecked",
     "v_cavities",
     "v_cavity_masking",
 ]

@@ -1,28 +1,34 @@
 """Directions at a surface point, reduced to the three cosines every isotropic model reads."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 import torch
 from torch import Tensor
 
 from torchbrdf._numerics import (
+    FEW,
     SUPPORTED_DTYPES,
     Components,
     angle_over_sine,
     components,
     cross,
+    cross_of,
     dot,
     dot_of,
     holds,
     horizon,
-    length,
+    in_pieces,
+    number,
     positive,
+    root,
     safe_sqrt,
     sine,
     unit_tolerance,
 )
+from torchbrdf.checks import taken_on_trust
 
 
 class TangentPlane(NamedTuple):
@@ -35,7 +41,10 @@ class TangentPlane(NamedTuple):
 
 
 class _computed_once:  # noqa: N801 - used as a decorator
-    """`functools.cached_property` without the lock that torch.compile cannot enter."""
+    """`functools.cached_property` without the lock that torch.compile cannot enter.
+
+    A value without the derivatives that a later reader may ask for is not kept.
+    """
 
     def __init__(self, compute: "Callable[[Cosines], Any]"):
         self.compute = compute
@@ -43,7 +52,8 @@ class _computed_once:  # noqa: N801 - used as a decorator
 
     def __get__(self, instance: "Cosines", owner: type) -> Any:
         value = self.compute(instance)
-        instance.__dict__[self.name] = value  # found before this descriptor from now on
+        if torch.is_grad_enabled() or not (instance.light.requires_grad or torch.is_inference_mode_enabled()):
+            instance.__dict__[self.name] = value  # found before this descriptor from now on
         return value
 
 
@@ -90,15 +100,19 @@ class Cosines:
             ValueError: a trailing dimension other than 3, shapes that do not broadcast, entries that
                 are not finite, or vectors that are not of unit length.
         """
-        vectors = {"normal": normal, "light": light, "view": view}
-        _check_shapes(vectors if tangent is None else vectors | {"tangent": tangent})
+        if not taken_on_trust():
+            given = {"normal": normal, "light": light, "view": view}
+            _check_shapes(given if tangent is None else given | {"tangent": tangent})
         if normalize:
-            vectors = {name: _normalized(name, v) for name, v in vectors.items()}
-        parts = [components(v) for v in vectors.values()]
-        if not normalize:
-            _check_unit(vectors, parts)
-        n, s, v = vectors.values()
-        return replace(cls._from_components(*parts), vectors=(n, s, v), tangent=tangent)
+            normal, light, view = _normalized("normal", normal), _normalized("light", light), _normalized("view", view)
+        extremes: list[Tensor] | None = None if normalize or taken_on_trust() else []
+        products = in_pieces(partial(_products, extremes=extremes), normal, light, view, own=1)
+        if extremes and not holds((torch.stack(extremes) - 1).abs() <= unit_tolerance(normal.dtype)):
+            _refuse_other_than_unit(normal=normal, light=light, view=view)  # NaN too: extremes pass it on
+        result = cls.from_products(*products)
+        # of a frozen instance that nobody has seen yet; `replace` would make another
+        result.__dict__.update(vectors=(normal, light, view), tangent=tangent)
+        return result
 
     @classmethod
     def _from_components(cls, n: Components, s: Components, v: Components) -> "Cosines":
@@ -107,22 +121,32 @@ class Cosines:
     @classmethod
     def from_products(cls, light: Tensor, view: Tensor, phase: Tensor) -> "Cosines":
         """From the three dot products themselves (...), unchecked."""
-        light, view, phase = torch.broadcast_tensors(light, view, phase)
-        above = torch.minimum(light, view) > horizon(light.dtype)
+        if not light.shape == view.shape == phase.shape:
+            light, view, phase = torch.broadcast_tensors(light, view, phase)
+        above = torch.minimum(light, view) > number(horizon(light.dtype), light)
         # multiplied and added, which takes a fifth of the time of a masked fill
         lit = above.to(light.dtype)
-        below = 1 - lit
+        below = number(1.0, lit) - lit
         light, view, phase = (torch.addcmul(below, product, lit) for product in (light, view, phase))
-        return cls(light, view, phase, above)
+        result = cls(light, view, phase, above)
+        result.__dict__["lit"] = lit
+        return result
 
     @_computed_once
     def lit(self) -> Tensor:
         """1 where light and view are above the horizon, else 0 (...)."""
         return self.above_horizon.to(self.light.dtype)
 
+    def in_pieces(self, compute: "Callable[[Cosines], tuple[Tensor, ...]]") -> tuple[Tensor, ...]:
+        """compute(self), functions of light, view and phase pixel by pixel: of an image some pixels at a time."""
+        if torch.compiler.is_compiling() or self.light.numel() <= FEW:
+            return compute(self)
+        products = (self.light, self.view, self.phase, self.above_horizon)
+        return in_pieces(lambda *piece: compute(Cosines(*piece)), *products)
+
     def zero_below_horizon(self, brdf: Tensor) -> Tensor:
         """brdf (..., channel), finite, where light and view are above the horizon, else 0 with zero gradient."""
-        return brdf * self.lit[..., None]
+        return brdf * self.lit.unsqueeze(-1)
 
     @_computed_once
     def half_phase(self) -> tuple[Tensor, Tensor]:
@@ -133,12 +157,8 @@ class Cosines:
         """
         if self.vectors is None:
             return safe_sqrt((1 - self.phase) / 2), safe_sqrt((1 + self.phase) / 2)
-        _, light, view = self.vectors
-        below = ~self.above_horizon
-        return (
-            (length(light - view) / 2).masked_fill(below, 0.0),
-            (length(light + view) / 2).masked_fill(below, 1.0),
-        )
+        away, toward = in_pieces(_half_lengths, *self.vectors[1:], own=1)
+        return away * self.lit, torch.addcmul(number(1.0, self.lit) - self.lit, toward, self.lit)
 
     @_computed_once
     def azimuth_sine(self) -> Tensor:
@@ -165,14 +185,11 @@ class Cosines:
                 "an anisotropic model needs a tangent: pass tangent=(..., 3), a direction along the surface, "
                 "to the model or to Cosines.of."
             )
-        normal, *directions = self.vectors
-        tangent = orthonormal_tangent(normal, self.tangent)
-        bitangent = cross(normal, tangent)
-        below = ~self.above_horizon
-        # n x s is s turned by 90 degrees about the normal: exactly 0 where both are one
-        turned = [cross(normal, direction) for direction in directions]
-        parts = [part for t in turned for part in (dot(bitangent, t), -dot(tangent, t))]
-        return TangentPlane(*(part.masked_fill(below, 0.0) for part in parts))
+        least: list[Tensor] | None = None if taken_on_trust() else []
+        parts = in_pieces(partial(_in_tangent_plane, least=least), *self.vectors, self.tangent, own=1)
+        if least and not holds(torch.stack(least) > unit_tolerance(self.light.dtype) ** 2):
+            orthonormal_tangent(self.vectors[0], self.tangent)  # says what is wrong
+        return TangentPlane(*(part * self.lit for part in parts))
 
     @_computed_once
     def alpha(self) -> Tensor:
@@ -184,15 +201,39 @@ class Cosines:
         """Cosine of the smaller polar angle (...)."""
         return torch.maximum(self.light, self.view)
 
-    @_computed_once
-    def sin_alpha(self) -> Tensor:
-        """Sine of the larger polar angle (...); zero gradient at normal incidence."""
-        return sine(self.alpha)
+    def _of_both(self, function: Callable[[Tensor], Tensor]) -> tuple[Tensor, Tensor]:
+        """A function of a cosine at alpha and beta: in one go where calls cost more than numbers."""
+        if torch.compiler.is_compiling() or self.light.numel() > FEW:
+            return function(self.alpha), function(self.beta)
+        of_alpha, of_beta = function(self._both).unbind(0)
+        return of_alpha, of_beta
 
     @_computed_once
+    def _both(self) -> Tensor:
+        """Cosines of alpha and beta (2, ...)."""
+        return torch.stack((self.alpha, self.beta))
+
+    @_computed_once
+    def sines(self) -> tuple[Tensor, Tensor]:
+        """Sines of alpha and beta, each (...); zero gradient at normal incidence."""
+        return self._of_both(sine)
+
+    @property
+    def sin_alpha(self) -> Tensor:
+        """Sine of the larger polar angle (...); zero gradient at normal incidence."""
+        return self.sines[0]
+
+    @property
     def sin_beta(self) -> Tensor:
         """Sine of the smaller polar angle (...); zero gradient at normal incidence."""
-        return sine(self.beta)
+        return self.sines[1]
+
+    @_computed_once
+    def tangents_squared(self) -> tuple[Tensor, Tensor]:
+        """tan^2 of the polar angles of light and view, each (...)."""
+        one = number(1.0, self.light)
+        light, view = (((one - c) * (one + c)).relu() / (c * c) for c in (self.light, self.view))
+        return light, view
 
     @_computed_once
     def in_plane(self) -> Tensor:
@@ -200,10 +241,15 @@ class Cosines:
         return self.phase - self.light * self.view
 
     @_computed_once
+    def sine_product(self) -> Tensor:
+        """sin(alpha) sin(beta) (...)."""
+        return self.sin_alpha * self.sin_beta
+
+    @_computed_once
     def across_plane(self) -> Tensor:
         """sin(alpha) sin(beta) (1 - |cos(dphi)|) (...); zero subgradient at dphi = 90 degrees."""
         # Rounding can leave the difference a hair below the zero that bounds it.
-        return (self.sin_alpha * self.sin_beta - self.in_plane.abs()).relu()
+        return (self.sine_product - self.in_plane.abs()).relu()
 
     @_computed_once
     def sine_ratio(self) -> Tensor:
@@ -211,14 +257,47 @@ class Cosines:
         return self.sin_beta / positive(self.sin_alpha)
 
     @_computed_once
-    def alpha_over_sine(self) -> Tensor:
-        """alpha/sin(alpha) (...), by a polynomial in the cosine."""
-        return angle_over_sine(self.alpha)
+    def angles_over_sines(self) -> tuple[Tensor, Tensor]:
+        """alpha/sin(alpha) and beta/sin(beta), each (...), by a polynomial in the cosine."""
+        return self._of_both(angle_over_sine)
 
-    @_computed_once
+    @property
+    def alpha_over_sine(self) -> Tensor:
+        """alpha/sin(alpha) (...)."""
+        return self.angles_over_sines[0]
+
+    @property
     def beta_over_sine(self) -> Tensor:
-        """beta/sin(beta) (...), by a polynomial in the cosine."""
-        return angle_over_sine(self.beta)
+        """beta/sin(beta) (...)."""
+        return self.angles_over_sines[1]
+
+
+def _half_lengths(light: Tensor, view: Tensor) -> tuple[Tensor, Tensor]:
+    """|light - view|/2 and |light + view|/2 (...)."""
+    s, v = components(light), components(view)
+    difference = s[0] - v[0], s[1] - v[1], s[2] - v[2]
+    total = s[0] + v[0], s[1] + v[1], s[2] + v[2]
+    return root(dot_of(difference, difference)) / 2, root(dot_of(total, total)) / 2
+
+
+def _in_tangent_plane(
+    normal: Tensor, light: Tensor, view: Tensor, tangent: Tensor, *, least: list[Tensor] | None
+) -> tuple[Tensor, ...]:
+    """The parts of a `TangentPlane`; appends the least squared sine between normal and tangent."""
+    n, s, v, t = components(normal), components(light), components(view), components(tangent)
+    # keeps the squares from overflowing; cancels in the result
+    largest = torch.maximum(torch.maximum(t[0].abs(), t[1].abs()), t[2].abs()).detach()
+    t = t[0] / largest, t[1] / largest, t[2] / largest
+    bitangent = cross_of(n, t)
+    squared = dot_of(bitangent, bitangent)
+    if least is not None and squared.numel():
+        with torch.no_grad():
+            least.append((squared / dot_of(t, t)).amin())
+    across = squared.rsqrt()
+    tangent_along = cross_of(bitangent, n)
+    # n x s is s turned by 90 degrees about the normal: exactly 0 where both are one
+    turned = [cross_of(n, direction) for direction in (s, v)]
+    return tuple(part * across for u in turned for part in (dot_of(bitangent, u), -dot_of(tangent_along, u)))
 
 
 def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
@@ -229,7 +308,7 @@ def orthonormal_tangent(normal: Tensor, tangent: Tensor) -> Tensor:
     bitangent = cross(normal, _normalized("tangent", tangent))
     squared = dot(bitangent, bitangent)
     parallel = squared <= unit_tolerance(squared.dtype) ** 2
-    if not holds(~parallel):
+    if not (taken_on_trust() or holds(~parallel)):
         raise ValueError(
             f"tangent must not be parallel to the normal; {int(parallel.sum())} of {parallel.numel()} are. "
             "Choose a direction along the surface."
@@ -273,14 +352,35 @@ def _listed(vectors: dict[str, Tensor]) -> str:
     return f"{', '.join(names)} and {last}"
 
 
-def _check_unit(vectors: dict[str, Tensor], parts: list[Components]) -> None:
-    """One look at all of them, and a second at each once something is off."""
-    with torch.no_grad():
-        squares = [dot_of(v, v) for v in parts]
-        worst = [(squared - 1).abs().amax() for squared in squares if squared.numel()]
-        if not worst or holds(torch.stack(worst).amax() <= unit_tolerance(worst[0].dtype)):  # so that NaN is off
-            return
-    for name, squared in zip(vectors, squares, strict=True):
+def _products(normal: Tensor, light: Tensor, view: Tensor, *, extremes: list[Tensor] | None) -> tuple[Tensor, ...]:
+    """The three dot products (...); appends the smallest and the largest squared length of each of the vectors."""
+    # sums over an axis of three: as fast as they are slow for many, and never fused when compiled
+    if torch.compiler.is_compiling() or light.numel() > FEW:
+        return _dots(dot_of, components(normal), components(light), components(view), extremes)
+    return _dots(_sum_of_products, normal, light, view, extremes)
+
+
+_Vector = TypeVar("_Vector", Tensor, Components)
+
+
+def _dots(
+    product: Callable[[_Vector, _Vector], Tensor], n: _Vector, s: _Vector, v: _Vector, extremes: list[Tensor] | None
+) -> tuple[Tensor, ...]:
+    if extremes is not None:
+        with torch.no_grad():
+            squares = [product(c, c) for c in (n, s, v)]
+            extremes += [limit for squared in squares if squared.numel() for limit in torch.aminmax(squared)]
+    return product(n, s), product(n, v), product(s, v)
+
+
+def _sum_of_products(a: Tensor, b: Tensor) -> Tensor:
+    return (a * b).sum(-1)
+
+
+def _refuse_other_than_unit(**vectors: Tensor) -> None:
+    """Raise ValueError for the first of the vectors (..., 3) that are not all of unit length: a second, slower look."""
+    for name, vector in vectors.items():
+        squared = dot(vector, vector).detach()
         off = ~((squared - 1).abs() <= unit_tolerance(squared.dtype))
         if not off.any():
             continue
@@ -296,7 +396,7 @@ def _check_unit(vectors: dict[str, Tensor], parts: list[Components]) -> None:
 def _normalized(name: str, v: Tensor) -> Tensor:
     largest = v.abs().amax(-1, keepdim=True).detach()  # keeps the squares from overflowing; cancels in the result
     usable = largest.isfinite() & (largest > 0)
-    if not holds(usable):
+    if not (taken_on_trust() or holds(usable)):
         bad = int((~usable).sum())
         raise ValueError(f"{name} must hold finite vectors of non-zero length; {bad} of {usable.numel()} do not.")
     scaled = v / largest

@@ -43,7 +43,7 @@ class FieldBRDF(BRDF):
         return total(self.parts_of(*fields).values())
 
     def evaluate(self, cosines: Cosines) -> Tensor:
-        return self.sum_of(*((field * cosines.lit)[..., None] for field in self.fields(cosines)))
+        return self.sum_of(*((field * cosines.lit).unsqueeze(-1) for field in self.fields(cosines)))
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
-        return self.parts_of(*(field[..., None] for field in self.fields(cosines)))
+        return self.parts_of(*(field.unsqueeze(-1) for field in self.fields(cosines)))

@@ -8,7 +8,8 @@ from typing import Any, ClassVar, TypeAlias, overload
 import torch
 from torch import Tensor, nn
 
-from torchbrdf._numerics import SUPPORTED_DTYPES, holds, unit_tolerance
+from torchbrdf._numerics import SUPPORTED_DTYPES, holds, number, unit_tolerance
+from torchbrdf.checks import checked, taken_on_trust
 
 
 @dataclass(frozen=True)
@@ -36,12 +37,24 @@ class Interval:
         return self.unit == "rad"
 
     def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
-        """Raise ValueError unless every entry lies in the domain (strictly inside if `open_ends`)."""
+        """Raise ValueError unless every entry lies in the domain (strictly inside if `open_ends`).
+
+        Not inside `torchbrdf.unchecked()`.
+        """
+        if taken_on_trust():
+            return
         if not isinstance(value, Tensor):
             raise TypeError(f"{name} must be a torch.Tensor; found {type(value).__name__}.")
-        inside = (value > self.low) & (value < self.high) if open_ends else (value >= self.low) & (value <= self.high)
-        if holds(inside):
+        if value.numel() == 0:
             return
+
+        def inside_of(x: Tensor) -> Tensor:
+            return (x > self.low) & (x < self.high) if open_ends else (x >= self.low) & (x <= self.high)
+
+        # the extremes stand for all: those of what holds a NaN are NaN, which lies nowhere
+        if holds(inside_of(torch.stack(torch.aminmax(value.detach())))):
+            return
+        inside = inside_of(value)
         finite = value[value.isfinite()]
         extent = f"min {finite.min():.6g}, max {finite.max():.6g}" if finite.numel() else "none is finite"
         opening = "(" if open_ends else "["
@@ -61,10 +74,11 @@ class Interval:
 
     def from_raw(self, raw: Tensor) -> Tensor:
         """Value inside the domain for any real number."""
-        # At least 1-D inside: forward differentiation of "number * 0-d float32 tensor" yields float64.
-        row = torch.atleast_1d(raw)
-        inside = row.exp() if self.high == math.inf else (self.high - self.low) * row.sigmoid()
-        return (self.low + inside).reshape(raw.shape)
+        inside = raw.exp() if self.high == math.inf else raw.sigmoid()
+        width = 1.0 if self.high == math.inf else self.high - self.low
+        # numbers as tensors: forward differentiation of "number * 0-d float32 tensor" yields float64
+        scaled = inside if width == 1 else inside * number(width, raw)
+        return scaled if self.low == 0 else scaled + number(self.low, raw)
 
 
 @dataclass(frozen=True)
@@ -83,7 +97,12 @@ class Simplex:
     angular: ClassVar[bool] = False
 
     def check(self, name: str, value: Tensor, *, open_ends: bool = False) -> None:
-        """Raise ValueError unless the entries are shares (all above 0 if `open_ends`)."""
+        """Raise ValueError unless the entries are shares (all above 0 if `open_ends`).
+
+        Not inside `torchbrdf.unchecked()`.
+        """
+        if taken_on_trust():
+            return
         if value.ndim == 0:
             raise ValueError(f"{name} must hold shares along its last axis; found a single number.")
         total = value.sum(-1)
@@ -139,6 +158,7 @@ class Constrained:
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
+        self._raw, self._fixed = f"raw_{name}", f"fixed_{name}"
 
     @overload
     def __get__(self, module: None, owner: type) -> "Constrained": ...
@@ -147,9 +167,9 @@ class Constrained:
     def __get__(self, module, owner):
         if module is None:
             return self
-        if f"fixed_{self.name}" in module._buffers:
-            return getattr(module, f"fixed_{self.name}")
-        return self.domain.from_raw(getattr(module, f"raw_{self.name}"))
+        if self._fixed in module._buffers:
+            return getattr(module, self._fixed)
+        return self.domain.from_raw(getattr(module, self._raw))
 
     def __set__(self, module: nn.Module, value: ParameterValue) -> None:
         held = isinstance(value, fixed)
@@ -163,8 +183,9 @@ class Constrained:
         tensor = _as_float_tensor(given)
         if tensor.dtype not in SUPPORTED_DTYPES:
             raise TypeError(f"{name} must be float32 or float64; found {tensor.dtype}.")
-        self.domain.check(name, tensor, open_ends=not held)
-        raw_name, fixed_name = f"raw_{self.name}", f"fixed_{self.name}"
+        with checked():  # the value outlives any context
+            self.domain.check(name, tensor, open_ends=not held)
+        raw_name, fixed_name = self._raw, self._fixed
         if held:
             module._parameters.pop(raw_name, None)
             module.register_buffer(fixed_name, tensor.clone())

@@ -15,33 +15,23 @@ from torch import Tensor
 from torchbrdf._numerics import safe_divide
 
 
-def lit_fraction(cos_facet_light: Tensor, cos_light: Tensor, cos_facet: Tensor) -> Tensor:
-    """Fraction of a facet's width that the source reaches; by symmetry also the fraction that a viewer sees.
+def mirror_attenuation(cos_facet_light: Tensor, *, cos_alpha: Tensor, cos_facet: Tensor) -> Tensor:
+    """Part of a facet's width that is lit and visible at once, where it mirrors light into view (...). [-] in (0, 1]
+
+    Lit is clamp(2 <s,n><a,n> / <s,a>), and so is visible with v for s; <s,a> and <v,a> are the same here.
 
     Args:
-        cos_facet_light: <s, a>, facet normal and source (...). [-]
-        cos_light: <s, n> (...). [-]
-        cos_facet: <a, n> (...). [-]
-    Returns: clamp(2 <s,n><a,n> / <s,a>) (...), 0 for a facet turned away. [-] in [0, 1]
-    Source: Oren & Nayar 1994, eq. (35).
+        cos_facet_light: <s,a> = <v,a>, facet normal and source (...). [-] > 0
+        cos_alpha: the smaller of <s,n> and <v,n> (...). [-] > 0
+        cos_facet: <a,n> (...). [-] > 0
+    Source: Oren & Nayar 1994, eqs. (35) and (38) repaired.
     """
-    return safe_divide(2 * cos_light * cos_facet, cos_facet_light, where=cos_facet_light > 0).clamp(0, 1)
-
-
-def geometric_attenuation(
-    cos_facet_light: Tensor, cos_facet_view: Tensor, *, cos_light: Tensor, cos_view: Tensor, cos_facet: Tensor
-) -> Tensor:
-    """Part of a facet's width that is lit and visible at once. All arguments and the result (...). [-] in [0, 1]
-
-    Source: Oren & Nayar 1994, eq. (38) repaired.
-    """
-    lit = lit_fraction(cos_facet_light, cos_light, cos_facet)
-    return torch.minimum(lit, lit_fraction(cos_facet_view, cos_view, cos_facet))
+    return (2 * cos_facet * cos_alpha / cos_facet_light).clamp(max=1.0)
 
 
 def strip_fraction(projection: Tensor) -> Tensor:
-    """`lit_fraction` in the slope plane: clamp(2 / X) with X = 1 + projection, projection = u.p (...); 0 for X <= 0.
-    [-]
+    """Part of a facet's width that is lit, in the slope plane: clamp(2 / X) with X = 1 + projection, projection = u.p
+    (...); 0 for X <= 0. [-]
     """
     facing = 1 + projection
     return safe_divide(torch.full_like(facing, 2.0), facing, where=facing > 0).clamp(0, 1)

@@ -9,6 +9,7 @@ from surfaces import Array
 
 from torchbrdf import Cosines, fixed
 from torchbrdf.models.heightfield.surface import OCCLUSION, GaussianHeightfield
+from torchbrdf.models.heightfield.transport import INDEPENDENT_FACETS, Transport
 from torchbrdf.models.heightfield.visibility import SMOOTH_HEIGHTFIELD, HeightfieldConstants
 
 NODES = 384  # 2e-5 of f_1
@@ -21,6 +22,7 @@ class LibraryModel:
     cosines: Cosines
     constants: tuple[float, ...] = astuple(SMOOTH_HEIGHTFIELD)
     highest_occlusion: float = OCCLUSION.high
+    transport: Transport = INDEPENDENT_FACETS
 
     @classmethod
     def at(cls, polar: Array, azimuths: int) -> "LibraryModel":
@@ -40,6 +42,7 @@ class LibraryModel:
             bounces=bounces,
             nodes=NODES,
             constants=HeightfieldConstants(*map(float, constants)),
+            transport=self.transport,
         )
         with torch.no_grad():
             return np.moveaxis(brdf.fields(self.cosines).numpy(), -1, 0)

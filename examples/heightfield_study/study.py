@@ -9,7 +9,8 @@ its single surfaces, 5 and 22 s; both divide among processes. `--share 0.4` take
 Draws surfaces of Gaussian heights (`surfaces.py`), meshes each at two finenesses (`terrain.py`), follows light through
 24 bounces (`tracing.py`), averages and extrapolates to vanishing cells (`samples.py`), fits the model's constants
 (`calibration.py`) and prints the tables (`report.py`). Surfaces that the folder has already are not traced again.
-`--against`: other traced data of the same format and slope, compared within standard errors.
+`fresh.py` judges the model on surfaces of other seeds and slopes; `fit_neighbours.py` finds the constants of its second
+bounce. `--against`: other traced data of the same format and slope, compared within standard errors.
 
 Deterministic per seed, but for last digits that another processor or another release of Embree may change.
 """

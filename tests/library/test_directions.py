@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from torchbrdf import Cosines, Lambert, OrenNayar
+from torchbrdf import EON, GGX, Cosines, Hapke, Lambert, OrenNayar
 from torchbrdf._numerics import horizon, unit_tolerance
 from torchbrdf.testing import TOLERANCE, random_directions
 
@@ -128,6 +128,46 @@ def test_derived_quantities_against_angles():
 def test_derived_quantities_are_computed_once():
     g = Cosines.of(**up())
     assert g.sin_alpha is g.sin_alpha
+
+
+@pytest.mark.parametrize("quiet", [torch.no_grad, torch.inference_mode])
+def test_what_is_kept_has_the_derivatives_a_later_reader_asks_for(quiet):
+    vectors = {name: v.requires_grad_() for name, v in up().items()}
+    g, brdf = Cosines.of(**vectors), OrenNayar().double()
+    with quiet():
+        brdf.evaluate(g)
+    late = torch.autograd.grad(brdf.evaluate(g).sum(), vectors["light"])
+    assert_close(late, torch.autograd.grad(brdf(**vectors).sum(), vectors["light"]))
+
+
+def test_cosines_serve_many_materials(dtype):
+    directions = random_directions(50, dtype=dtype, generator=torch.Generator().manual_seed(0))
+    g = Cosines.of(*directions)
+    for brdf in (Lambert(), OrenNayar(sigma=0.2), OrenNayar(sigma=0.7), EON(), GGX()):
+        assert torch.equal(brdf.to(dtype).evaluate(g), brdf(*directions))
+
+
+@pytest.mark.parametrize("model", [OrenNayar, EON, GGX, Hapke])
+def test_many_directions_are_a_loop_over_few(model):
+    """Images go in pieces, few directions together: other operations, the same numbers to rounding."""
+    directions = random_directions(140_000, generator=torch.Generator().manual_seed(0))
+    brdf = model()
+    with torch.no_grad():
+        every = brdf(*directions)
+        for start in (0, 70_000, 139_900):
+            few = brdf(*(v[start : start + 100] for v in directions))
+            assert_close(every[start : start + 100], few, rtol=1e-5, atol=1e-7)
+
+
+def test_one_vector_among_many_is_looked_at():
+    directions = dict(random_directions(140_000, generator=torch.Generator().manual_seed(0))._asdict())
+    for name in directions:
+        for spoilt in (1.001, math.nan):
+            bad = {key: v.clone() for key, v in directions.items()}
+            bad[name][131_072, 1] *= spoilt
+            bad[name][131_072, 0] += 0.01
+            with pytest.raises(ValueError, match=f"{name} must hold finite unit vectors; 1 of 140000"):
+                Lambert()(**bad)
 
 
 def test_horizon_is_one_rounding_error(dtype):

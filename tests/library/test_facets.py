@@ -86,6 +86,33 @@ def test_slope_area_norm_is_the_faddeeva_form(sigma):
     )
 
 
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
+def test_slope_area_norm_and_its_derivative_are_integrals(dtype):
+    """Of exp(-theta^2/2 sigma^2) sin(theta), by quadrature: per texel, down to sigma = 0.02."""
+    sigma = torch.linspace(0.02, math.pi / 2, 40, dtype=dtype, requires_grad=True)
+    theta, weight = gauss(0, math.pi / 2, 60, 12)
+    s = sigma.detach().double()[:, None]
+    density = 2 * math.pi * (-((theta / s) ** 2) / 2).exp() * theta.sin() * weight
+    norm = slope_area_norm(sigma)
+    (slope,) = torch.autograd.grad(norm.sum(), sigma)
+    value, derivative = (1e-13, 2e-11) if dtype == torch.float64 else (1e-6, 1e-5)
+    assert_close(norm.detach().double(), density.sum(-1), rtol=value, atol=0)
+    assert_close(slope.double(), (density * theta**2 / s**3).sum(-1), rtol=derivative, atol=0)
+
+
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float32])
+def test_beckmann_lambda_and_its_derivative(dtype):
+    """Against erfcx, and dLambda/dT = a exp(-a^2)/(4 sqrt(pi)); known to the rounding of 1, which it is added to."""
+    t = torch.logspace(-3, 8, 60, dtype=dtype, requires_grad=True)
+    a = t.detach().double() ** -0.5
+    exact = 0.5 * (-a * a).exp() * (1 / (a * math.sqrt(math.pi)) - torch.special.erfcx(a))
+    got = beckmann_lambda(t)
+    (slope,) = torch.autograd.grad(got.sum(), t)
+    eps = torch.finfo(dtype).eps
+    assert_close(got.detach().double(), exact, rtol=8 * eps, atol=4 * eps)
+    assert_close(slope.double(), a * (-a * a).exp() / (4 * math.sqrt(math.pi)), rtol=1e3 * eps, atol=4 * eps)
+
+
 @pytest.mark.parametrize("sigma", [0.05, 0.3, 1.0, math.pi / 2])
 def test_slope_area_angle_inverts_the_integral(sigma):
     u = torch.linspace(0, 0.999999, 101, dtype=torch.float64)

@@ -12,6 +12,7 @@ from torch.utils._python_dispatch import _get_current_dispatch_mode
 
 from torchbrdf._numerics import SUPPORTED_DTYPES
 from torchbrdf.brdf import BRDF
+from torchbrdf.checks import taken_on_trust
 from torchbrdf.kernels.forms import form_for
 from torchbrdf.kernels.machine import is_installed
 from torchbrdf.kernels.operator import reflectance
@@ -46,7 +47,7 @@ def by_kernel(model: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> Tenso
 
     The formula is for whatever is not plain numbers on a CPU: traced, compiled or mapped tensors, forward
     differentiation, other devices, dtypes that differ.
-    Raises: ValueError where a vector is not of unit length, as `Cosines.of`.
+    Raises: ValueError where a vector is not of unit length, as `Cosines.of`; not inside `torchbrdf.unchecked()`.
     """
     if torch.compiler.is_compiling() or _is_transformed():
         return None
@@ -59,7 +60,7 @@ def by_kernel(model: BRDF, normal: Tensor, light: Tensor, view: Tensor) -> Tenso
         return None
     if not is_installed() or form.kernel(material, normal.dtype) is None:
         return None
-    return reflectance(form.place, arrays, checked=True)
+    return reflectance(form.place, arrays, checked=not taken_on_trust())
 
 
 def _is_plain(tensor: Any) -> bool:

@@ -80,7 +80,7 @@ class _Text:
         self.lines.append(f"{name} = {instruction}")
         return name
 
-    def float(self, operation: str, a: str, b: str, *, contract: bool = True) -> str:
+    def op(self, operation: str, a: str, b: str, *, contract: bool = True) -> str:
         return self.made(f"{operation}{' contract' if contract else ''} {self.kind} {a}, {b}")
 
     def integer(self, operation: str, a: str, b: str | int) -> str:
@@ -102,14 +102,14 @@ class _Text:
         *rest, highest = coefficients
         total = self.number(highest)
         for coefficient in reversed(rest):
-            total = self.float("fadd", self.float("fmul", total, x), self.number(coefficient))
+            total = self.op("fadd", self.op("fmul", total, x), self.number(coefficient))
         return total
 
     def times_log_2(self, n: str, x: str) -> tuple[str, str]:
         """x - n log(2) in steps that keep its digits, and what was left out of the first: to be added for the log."""
-        coarse = self.float("fmul", n, self.number(self.real.coarse))
-        fine = self.float("fmul", n, self.number(self._fine))
-        return self.float("fsub", self.float("fsub", x, coarse), fine), coarse
+        coarse = self.op("fmul", n, self.number(self.real.coarse))
+        fine = self.op("fmul", n, self.number(self._fine))
+        return self.op("fsub", self.op("fsub", x, coarse), fine), coarse
 
     @property
     def _fine(self) -> float:
@@ -128,15 +128,15 @@ def exponential(result: str, x: str, real: Real) -> list[str]:
     kept = t.chosen("ogt", kept, high, high, kept)
     # a sum with it is rounded to a whole number, which its last bits hold
     magic = 1.5 * 2.0**real.mantissa
-    held = t.float("fadd", t.float("fmul", kept, t.number(1 / math.log(2)), contract=False), t.number(magic))
-    rest, _ = t.times_log_2(t.float("fsub", held, t.number(magic), contract=False), kept)
+    held = t.op("fadd", t.op("fmul", kept, t.number(1 / math.log(2)), contract=False), t.number(magic))
+    rest, _ = t.times_log_2(t.op("fsub", held, t.number(magic), contract=False), kept)
     series = t.polynomial([1 / math.factorial(k) for k in range(real.exp_terms)], rest)
     whole = t.integer("sub", t.bits_of(held), bits(magic, real))
     # 2^n as a product of two, of which neither overflows
     half = t.integer("ashr", whole, 1)
     for n in (half, t.integer("sub", whole, half)):
         power = t.of_bits(t.integer("shl", t.integer("add", n, real.bias), real.mantissa))
-        series = t.float("fmul", series, power, contract=False)
+        series = t.op("fmul", series, power, contract=False)
     return t.ends_as(series)
 
 
@@ -145,18 +145,18 @@ def logarithm(result: str, x: str, real: Real) -> list[str]:
     t = _Text(result, real)
     one, zero = t.number(1.0), t.number(0.0)
     smallest, shift = 2.0 ** (1 - real.bias), real.mantissa + 1
-    scaled = t.float("fmul", x, t.number(2.0**shift), contract=False)  # what lies below the normal numbers
+    scaled = t.op("fmul", x, t.number(2.0**shift), contract=False)  # what lies below the normal numbers
     normal = t.chosen("olt", x, t.number(smallest), scaled, x)
     offset = t.chosen("olt", x, t.number(smallest), t.number(float(-shift)), zero)
     shown = t.bits_of(normal)
     n = t.integer("ashr", t.integer("sub", shown, bits(0.5**0.5, real)), real.mantissa)
     m = t.of_bits(t.integer("sub", shown, t.integer("shl", n, real.mantissa)))
-    exponent = t.float("fadd", t.made(f"sitofp {t.whole} {n} to {t.kind}"), offset)
-    ratio = t.float("fdiv", t.float("fsub", m, one), t.float("fadd", m, one))
-    series = t.polynomial([2 / (2 * k + 1) for k in range(real.log_terms)], t.float("fmul", ratio, ratio))
-    fine = t.float("fmul", exponent, t.number(t._fine))
-    near = t.float("fadd", t.float("fmul", series, ratio), fine)
-    value = t.float("fadd", t.float("fmul", exponent, t.number(real.coarse)), near)
+    exponent = t.op("fadd", t.made(f"sitofp {t.whole} {n} to {t.kind}"), offset)
+    ratio = t.op("fdiv", t.op("fsub", m, one), t.op("fadd", m, one))
+    series = t.polynomial([2 / (2 * k + 1) for k in range(real.log_terms)], t.op("fmul", ratio, ratio))
+    fine = t.op("fmul", exponent, t.number(t._fine))
+    near = t.op("fadd", t.op("fmul", series, ratio), fine)
+    value = t.op("fadd", t.op("fmul", exponent, t.number(real.coarse)), near)
     value = t.chosen("oeq", x, zero, t.number(-math.inf), value)
     value = t.chosen("oeq", x, t.number(math.inf), x, value)
     return t.ends_as(t.chosen("olt", x, zero, t.number(math.nan), t.chosen("une", x, x, x, value)))
@@ -165,9 +165,9 @@ def logarithm(result: str, x: str, real: Real) -> list[str]:
 def scaled_complement(result: str, x: str, real: Real) -> list[str]:
     """exp(x^2) erfc(x) for x >= 0."""
     t = _Text(result, real)
-    place = t.float("fdiv", t.float("fsub", x, t.number(_K)), t.float("fadd", x, t.number(_K)))
-    growth = t.float("fadd", t.float("fadd", x, x), t.number(1.0))
-    return t.ends_as(t.float("fdiv", t.polynomial(_complement_polynomial(real.erfc_degree), place), growth))
+    place = t.op("fdiv", t.op("fsub", x, t.number(_K)), t.op("fadd", x, t.number(_K)))
+    growth = t.op("fadd", t.op("fadd", x, x), t.number(1.0))
+    return t.ends_as(t.op("fdiv", t.polynomial(_complement_polynomial(real.erfc_degree), place), growth))
 
 
 @cache

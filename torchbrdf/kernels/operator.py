@@ -10,6 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 from torch.library import Library
+from torch.utils._python_dispatch import _disable_current_modes
 
 from torchbrdf.directions import Cosines
 from torchbrdf.kernels.forms import form_at
@@ -102,6 +103,15 @@ def _unlooked_at(form: int, arrays: Sequence[Tensor], checked: bool) -> Tensor:
     return _formula(form, arrays)
 
 
+def _shape_of_value(form: int, arrays: Sequence[Tensor], checked: bool) -> Tensor:
+    first, _, _, *material = arrays
+    with _disable_current_modes():  # numbers are needed to record, and shapes alone are known here
+        kernel = form_at(form).kernel(material, first.dtype)
+    if kernel is None:
+        return _formula(form, arrays)
+    return first.new_empty((*kernel.lead_of(arrays), kernel.pixel.channels))
+
+
 def _shapes_of_slopes(form: int, arrays: Sequence[Tensor], weight: Tensor, wanted: Sequence[bool]) -> list[Tensor]:
     return [torch.empty_like(t) if want else weight.new_empty(0) for t, want in zip(arrays, wanted, strict=True)]
 
@@ -111,5 +121,5 @@ _library.impl("reflectance", _formula, "CUDA")
 _library.impl("reflectance", _differentiable, "Autograd")
 _library.impl("reflectance", _unlooked_at, "FuncTorchBatched")
 _library.impl("reflectance_slopes", _slopes, "CompositeExplicitAutograd")
-torch.library.register_fake("torchbrdf::reflectance", _unlooked_at, lib=_library)
+torch.library.register_fake("torchbrdf::reflectance", _shape_of_value, lib=_library)
 torch.library.register_fake("torchbrdf::reflectance_slopes", _shapes_of_slopes, lib=_library)

@@ -288,6 +288,8 @@ ELEMENTWISE: dict[str, Rule] = {
     "rsqrt": lambda p, x: p.reciprocal(p.append("sqrt", x)),
     "reciprocal": Program.reciprocal,
     "addcmul": lambda p, x, a, b, value=None: p.add(x, p.multiply(_scaled(p, a, value), b)),
+    "addcdiv": lambda p, x, a, b, value=None: p.add(x, p.divide(_scaled(p, a, value), b)),
+    "lerp": lambda p, a, b, weight: p.add(a, p.multiply(weight, p.subtract(b, a))),
     "pow": _power,
     "exp": lambda p, x: p.append("exp", x),
     "log": lambda p, x: p.append("log", x),

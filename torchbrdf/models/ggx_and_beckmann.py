@@ -18,7 +18,6 @@ from torchbrdf.facets import (
     ggx_distribution,
     ggx_lambda,
     smith_correlated,
-    tangent_squared,
 )
 from torchbrdf.fresnel import Fresnel, Schlick
 from torchbrdf.parameters import WIDTH, Constrained, ParameterValue, declared, fixed, kept
@@ -31,7 +30,7 @@ class _Microfacet(BRDF):
     fresnel: Fresnel
     masking: Masking
 
-    def distribution(self, half: HalfVector) -> Tensor:
+    def distribution(self, half: HalfVector, *widths: Tensor) -> Tensor:
         """D (...). [1/sr]"""
         raise NotImplementedError
 
@@ -43,25 +42,30 @@ class _Microfacet(BRDF):
         """Facet normals (..., 3) in proportion to their area seen along the local view (..., 3)."""
         raise NotImplementedError
 
-    def slopes_squared(self, cosines: Cosines) -> tuple[Tensor, Tensor]:
+    def widths(self) -> tuple[Tensor, ...]:
+        """One width, or that along the tangent and that across it, each (...). [-]"""
+        raise NotImplementedError
+
+    def slopes_squared(self, cosines: Cosines, *widths: Tensor) -> tuple[Tensor, Tensor]:
         """T of light and of view (...). [-]"""
         raise NotImplementedError
 
     def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
-        half = HalfVector.of(cosines)
-        lambdas = [self.smith_lambda(t) for t in self.slopes_squared(cosines)]
+        half, widths = HalfVector.of(cosines), self.widths()
+        lambdas = [self.smith_lambda(t) for t in self.slopes_squared(cosines, *widths)]
         shadowing = self.masking(cosines, half, *lambdas)
-        lobe = self.distribution(half) * shadowing / (4 * cosines.light * cosines.view)
-        return {"specular": lobe[..., None] * self.fresnel(half.cos_light)}
+        lobe = self.distribution(half, *widths) * shadowing / (4 * cosines.light * cosines.view)
+        return {"specular": lobe.unsqueeze(-1) * self.fresnel(half.cos_light)}
 
     def propose(self, view: Tensor, u: Tensor) -> tuple[Tensor, Tensor]:
         light = mirrored(view, self.visible_facet(view, u))
         return light, torch.zeros_like(light[..., 0], dtype=torch.bool)
 
     def density(self, cosines: Cosines) -> Tensor:
-        _, of_view = self.slopes_squared(cosines)
+        widths = self.widths()
+        _, of_view = self.slopes_squared(cosines, *widths)
         seen = 1 / (1 + self.smith_lambda(of_view))
-        return self.distribution(HalfVector.of(cosines)) * seen / (4 * cosines.view)
+        return self.distribution(HalfVector.of(cosines), *widths) * seen / (4 * cosines.view)
 
     def stand_ins(self) -> dict[str, list[Option]]:
         """The same facets with one reflectance at every angle."""
@@ -88,12 +92,13 @@ class _Isotropic(_Microfacet):
         self.fresnel = Schlick(f0=self.alpha.new_tensor(0.04)) if fresnel is None else fresnel
         self.masking = masking
 
-    def slopes_squared(self, cosines: Cosines) -> tuple[Tensor, Tensor]:
-        a2 = self.alpha * self.alpha
-        return a2 * tangent_squared(cosines.light), a2 * tangent_squared(cosines.view)
+    def slopes_squared(self, cosines: Cosines, *widths: Tensor) -> tuple[Tensor, Tensor]:
+        (alpha,) = widths
+        a2, (light, view) = alpha * alpha, cosines.tangents_squared
+        return a2 * light, a2 * view
 
-    def _widths(self) -> tuple[Tensor, Tensor]:
-        return self.alpha, self.alpha
+    def widths(self) -> tuple[Tensor]:
+        return (self.alpha,)
 
 
 class _Anisotropic(_Microfacet):
@@ -116,9 +121,9 @@ class _Anisotropic(_Microfacet):
         self.fresnel = Schlick(f0=self.alpha_x.new_tensor(0.04)) if fresnel is None else fresnel
         self.masking = masking
 
-    def slopes_squared(self, cosines: Cosines) -> tuple[Tensor, Tensor]:
+    def slopes_squared(self, cosines: Cosines, *widths: Tensor) -> tuple[Tensor, Tensor]:
         c, plane = cosines, cosines.tangent_plane
-        ax, ay = self._widths()
+        ax, ay = widths
         light = ((ax * plane.light_tangent) ** 2 + (ay * plane.light_bitangent) ** 2) / (c.light * c.light)
         view = ((ax * plane.view_tangent) ** 2 + (ay * plane.view_bitangent) ** 2) / (c.view * c.view)
         return light, view
@@ -130,7 +135,7 @@ class _Anisotropic(_Microfacet):
         rounded = self.isotropic(alpha=fixed(alpha) if held else alpha, fresnel=self.fresnel, masking=self.masking)
         return {ANISOTROPY: [Option("one width in all azimuths", (ANISOTROPY,), rounded)]} | super().stand_ins()
 
-    def _widths(self) -> tuple[Tensor, Tensor]:
+    def widths(self) -> tuple[Tensor, Tensor]:
         return self.alpha_x, self.alpha_y
 
 
@@ -153,14 +158,14 @@ class GGX(_Isotropic):
         microfacet-based BRDFs", Journal of Computer Graphics Techniques 3(2), eqs. (72), (99).
     """
 
-    def distribution(self, half: HalfVector) -> Tensor:
-        return ggx_distribution(half, alpha=self.alpha)
+    def distribution(self, half: HalfVector, *widths: Tensor) -> Tensor:
+        return ggx_distribution(half, alpha=widths[0])
 
     def smith_lambda(self, slope_squared: Tensor) -> Tensor:
         return ggx_lambda(slope_squared)
 
     def visible_facet(self, view: Tensor, u: Tensor) -> Tensor:
-        return visible_ggx_facet(view, *self._widths(), u)
+        return visible_ggx_facet(view, self.alpha, self.alpha, u)
 
 
 @final
@@ -172,14 +177,14 @@ class AnisotropicGGX(_Anisotropic):
 
     isotropic = GGX
 
-    def distribution(self, half: HalfVector) -> Tensor:
-        return anisotropic_ggx_distribution(half, alpha_x=self.alpha_x, alpha_y=self.alpha_y)
+    def distribution(self, half: HalfVector, *widths: Tensor) -> Tensor:
+        return anisotropic_ggx_distribution(half, alpha_x=widths[0], alpha_y=widths[1])
 
     def smith_lambda(self, slope_squared: Tensor) -> Tensor:
         return ggx_lambda(slope_squared)
 
     def visible_facet(self, view: Tensor, u: Tensor) -> Tensor:
-        return visible_ggx_facet(view, *self._widths(), u)
+        return visible_ggx_facet(view, self.alpha_x, self.alpha_y, u)
 
 
 @final
@@ -200,14 +205,14 @@ class Beckmann(_Isotropic):
         1982, "A reflectance model for computer graphics", DOI 10.1145/357290.357293; Heitz 2014 (as `GGX`), eq. (99).
     """
 
-    def distribution(self, half: HalfVector) -> Tensor:
-        return beckmann_distribution(half, alpha=self.alpha)
+    def distribution(self, half: HalfVector, *widths: Tensor) -> Tensor:
+        return beckmann_distribution(half, alpha=widths[0])
 
     def smith_lambda(self, slope_squared: Tensor) -> Tensor:
         return beckmann_lambda(slope_squared)
 
     def visible_facet(self, view: Tensor, u: Tensor) -> Tensor:
-        return visible_beckmann_facet(view, *self._widths(), u)
+        return visible_beckmann_facet(view, self.alpha, self.alpha, u)
 
 
 @final
@@ -219,11 +224,11 @@ class AnisotropicBeckmann(_Anisotropic):
 
     isotropic = Beckmann
 
-    def distribution(self, half: HalfVector) -> Tensor:
-        return anisotropic_beckmann_distribution(half, alpha_x=self.alpha_x, alpha_y=self.alpha_y)
+    def distribution(self, half: HalfVector, *widths: Tensor) -> Tensor:
+        return anisotropic_beckmann_distribution(half, alpha_x=widths[0], alpha_y=widths[1])
 
     def smith_lambda(self, slope_squared: Tensor) -> Tensor:
         return beckmann_lambda(slope_squared)
 
     def visible_facet(self, view: Tensor, u: Tensor) -> Tensor:
-        return visible_beckmann_facet(view, *self._widths(), u)
+        return visible_beckmann_facet(view, self.alpha_x, self.alpha_y, u)

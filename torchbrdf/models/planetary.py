@@ -6,7 +6,7 @@ from typing import final
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import angle, safe_divide, safe_power, safe_sqrt, sine_excess
+from torchbrdf._numerics import angle, root, safe_divide, safe_power, safe_sqrt, sine_excess
 from torchbrdf.brdf import BRDF
 from torchbrdf.directions import Cosines
 from torchbrdf.linear import LinearBRDF
@@ -171,7 +171,7 @@ class Hapke(BRDF):
         # 1 + 2 b cos(g) + b^2 as a sum of squares, which keeps its digits in the peak of a narrow lobe
         squared = torch.where(b < 0, (1 + b) ** 2 - 4 * b * away * away, (1 - b) ** 2 + 4 * b * toward * toward)
         phase = (1 - b * b) * safe_power(squared, torch.full_like(b, -1.5))
-        absorbed = safe_sqrt(1 - w)
+        absorbed = root(1 - w)
         h_light, h_view = (
             (1 + 2 * m) / (1 + 2 * m * absorbed) for m in (cosines.light[..., None], cosines.view[..., None])
         )

@@ -6,7 +6,7 @@ from typing import Any, final
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import angle_over_sine, safe_sqrt, sine
+from torchbrdf._numerics import angle_over_sine, number, safe_sqrt, sine
 from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.effects import INTERREFLECTION, ROUGHNESS
@@ -85,8 +85,15 @@ class _RoughDiffuse(CltcSampled, FieldBRDF, LinearBRDF):
 
     def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
         """White FON (...). [1/sr]"""
+        (retro,) = cosines.in_pieces(lambda g: (retro_term(g),))
+        flat, rough = self._flat_and_rough()
+        return (torch.addcmul(flat, rough, retro),)
+
+    def _flat_and_rough(self) -> tuple[Tensor, Tensor]:
+        """1 and r over pi (1 + c1 r), each (...)."""
         r = self.roughness
-        return ((1 + r * retro_term(cosines)) / (math.pi * (1 + C1 * r)),)
+        flat = 1 / (math.pi + (math.pi * C1) * r)
+        return flat, flat * r
 
     def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
         return {"direct": torch.atleast_1d(self.albedo) * fields[0]}
@@ -172,8 +179,9 @@ class EON(_RoughDiffuse):
 
     def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
         """White FON, and what comes of the light it loses (...). [1/sr]"""
-        r = self.roughness
-        return (*super().fields(cosines), r / (math.pi * (1 + C1 * r)) * self._lost(cosines))
+        retro, lost = cosines.in_pieces(lambda g: (retro_term(g), self._lost(g)))
+        flat, rough = self._flat_and_rough()
+        return torch.addcmul(flat, rough, retro), rough * lost
 
     def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
         return super().parts_of(fields[0]) | {"interreflection": self._returned() * fields[1]}
@@ -181,7 +189,8 @@ class EON(_RoughDiffuse):
     def sum_of(self, *fields: Tensor) -> Tensor:
         rho, average = torch.atleast_1d(self.albedo), fon_average_albedo(self.roughness[..., None])
         direct, returned = fields
-        return rho * (direct + rho * (average * returned) / (1 - rho * (1 - average)))
+        left = torch.addcmul(number(1.0, rho), rho, 1 - average, value=-1)
+        return rho * torch.addcdiv(direct, rho * (average * returned), left)
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return torch.ones_like(cosines.light), retro_term(cosines), self._lost(cosines)

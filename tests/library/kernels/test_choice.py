@@ -8,7 +8,7 @@ import torch
 from helpers.kernels import frames, made, with_compiler
 from torch.testing import assert_close
 
-from torchbrdf import Lambert, OrenNayar, native, oren_nayar
+from torchbrdf import Lambert, OrenNayar, native, oren_nayar, unchecked
 from torchbrdf.directions import Cosines
 from torchbrdf.kernels import by_kernel, choice
 
@@ -67,6 +67,15 @@ def test_bad_input_raises_the_same(smallest):
             model(normal, [0.0, 0.0, 1.0], view)
         with pytest.raises(RuntimeError):
             OrenNayar(sigma=torch.full((7,), 0.3))(normal, light, view)
+
+
+@with_compiler
+def test_unchecked_nothing_is_looked_at():
+    normal, light, view = frames(10)
+    with native(), unchecked():
+        got = made("functional")(normal, light, 1.01 * view)
+    with native(math.inf), unchecked():
+        assert_close(got, made("functional")(normal, light, 1.01 * view), rtol=1e-11, atol=1e-13)
 
 
 @with_compiler

@@ -49,6 +49,7 @@ FUNCTIONS = {
     "masks": lambda x, y: torch.where(x > y, x * x, y).masked_fill((x < 0) & ~(y < 0), 0.5) * (x > 0.1),
     "thresholds": lambda x, y: torch.nn.functional.threshold(x, 0.1, 0.2) * y,
     "conversions": lambda x, y: x * (y > 0).to(x.dtype) + torch.addcmul(x, x, y, value=-2.0),
+    "fused": lambda x, y: torch.addcdiv(x, y, x * x + 1, value=0.5) + torch.lerp(x, y.expand(3), 0.3),
     "sums": lambda x, y: x.sum() * y + torch.stack((x, x * y)).sum(0) + x.unsqueeze(0).sum(0, keepdim=True)[0],
     "views": lambda x, y: torch.stack(x.unbind()[::-1]).reshape(3, 1)[:, 0] * y.expand(3) + x.flip(0)[1:3].sum() * x[0],
     "products": lambda x, y: torch.stack((x, y.expand(3), x * y)) @ x.reshape(3, 1),

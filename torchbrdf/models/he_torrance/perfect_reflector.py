@@ -13,7 +13,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import cross, dot, safe_divide, safe_sqrt
+from torchbrdf._numerics import components, cross_of, dot_of, in_pieces, root, safe_divide, sine
 from torchbrdf.directions import Cosines
 from torchbrdf.facets import HalfVector
 from torchbrdf.models.he_torrance.roughness import effective_roughness
@@ -41,7 +41,7 @@ class Geometry(NamedTuple):
     def of(cls, cosines: Cosines) -> "Geometry":
         half = HalfVector.of(cosines)
         squared = 4 * half.cos_light * half.cos_light
-        sines = [_sine(cosines, which) for which in ("light", "view")]
+        sines = _sines(cosines)
         parts = (cosines.light, sines[0], cosines.view, sines[1], half.sine_squared * squared, squared)
         return cls(*(part[..., None] for part in torch.broadcast_tensors(*parts)))
 
@@ -51,14 +51,19 @@ class Geometry(NamedTuple):
         return self.squared.sqrt() / 2
 
 
-def _sine(cosines: Cosines, which: str) -> Tensor:
-    """Sine of a polar angle (...), from the vectors where they are known; zero gradient at normal incidence."""
+def _sines(cosines: Cosines) -> tuple[Tensor, Tensor]:
+    """Sines of both polar angles (...), from the vectors where they are known; zero gradient at normal incidence."""
     if cosines.vectors is None:
-        c = getattr(cosines, which)
-        return safe_sqrt((1 - c) * (1 + c))
-    normal, light, view = cosines.vectors
-    across = cross(normal, light if which == "light" else view)
-    return safe_sqrt(dot(across, across).masked_fill(~cosines.above_horizon, 0.0))
+        return sine(cosines.light), sine(cosines.view)
+    light, view = in_pieces(_sines_squared, *cosines.vectors, own=1)
+    return root(light * cosines.lit), root(view * cosines.lit)
+
+
+def _sines_squared(normal: Tensor, light: Tensor, view: Tensor) -> tuple[Tensor, Tensor]:
+    """Squared sines of light and view to the normal (...)."""
+    n = components(normal)
+    across_light, across_view = cross_of(n, components(light)), cross_of(n, components(view))
+    return dot_of(across_light, across_light), dot_of(across_view, across_view)
 
 
 def directional_diffuse_of_waves(geometry: Geometry, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor) -> Tensor:

@@ -100,20 +100,23 @@ def _remember(ctx, inputs, output) -> None:
     ctx.save_for_backward(g, t)
 
 
-def _slopes(function, ctx) -> tuple[Tensor, Tensor]:
-    """d/dg and d/dt of each output (order, ...): derivatives one order higher, by the same function."""
+def _slopes(function, ctx, wanted: Sequence[bool]) -> list[Tensor | None]:
+    """d/dg and d/dt of each output (order, ...), those wanted: derivatives one order higher, by the same function."""
     pairs = _pairs(ctx.orders)
-    raised = sorted({(n + 1, q) for n, q in pairs} | {(n, q + 1) for n, q in pairs})
+    higher = [[(n + 1 - up, q + up) for n, q in pairs] if wanted[up] else [] for up in (0, 1)]
+    raised = sorted({*higher[0], *higher[1]})
     if max(n + q for n, q in raised) > _HIGHEST_DERIVATIVE:
         raise NotImplementedError(f"series_over_g has {_HIGHEST_DERIVATIVE} derivatives; one more was asked for")
     derivatives = function(*ctx.saved_tensors, [i for pair in raised for i in pair])
-    by_g, by_t = ([raised.index((n + 1 - up, q + up)) for n, q in pairs] for up in (0, 1))
-    return derivatives[by_g], derivatives[by_t]
+    return [derivatives[[raised.index(pair) for pair in rows]] if rows else None for rows in higher]
 
 
-def _pulled_back(function, ctx, upstream: Tensor) -> tuple[Tensor, Tensor, None]:
-    by_g, by_t = _slopes(function, ctx)
-    return (by_g * upstream).sum(0), (by_t * upstream).sum(0), None
+def _pulled_back(function, ctx, upstream: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
+    by_g, by_t = (
+        None if slopes is None else (slopes * upstream).sum(0)
+        for slopes in _slopes(function, ctx, ctx.needs_input_grad[:2])
+    )
+    return by_g, by_t, None
 
 
 class _Eager(torch.autograd.Function):
@@ -134,8 +137,8 @@ class _Eager(torch.autograd.Function):
 
     @staticmethod
     def jvp(ctx, g_tangent, t_tangent, _):  # pyright: ignore[reportIncompatibleMethodOverride]
-        by_g, by_t = _slopes(_Eager.apply, ctx)
-        return by_g * g_tangent + by_t * t_tangent
+        by_g, by_t = _slopes(_Eager.apply, ctx, (True, True))
+        return by_g * g_tangent + by_t * t_tangent  # pyright: ignore[reportOptionalOperand]
 
     @staticmethod
     def vmap(info, in_dims, g, t, orders):  # pyright: ignore[reportIncompatibleMethodOverride]
@@ -200,8 +203,9 @@ def _sum(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, m: float, terms
     scaled = g / unit
     most = max(n for n, _ in orders)
     totals = [torch.zeros_like(g) for _ in orders]
-    above: dict[int, list[Tensor]] = {q: [] for _, q in orders}
-    room = torch.empty_like(t)  # one for all terms: to take fresh memory costs more than to compute
+    # one room for all terms: to take fresh memory costs more than to compute
+    room = torch.empty_like(t)
+    above, fresh = ({q: [torch.zeros_like(t) for _ in range(most + 1)] for _, q in orders} for _ in range(2))
     for j in range(terms + most - 1, -1, -1):
         decay = exp_or_zero(torch.mul(t, -1 / (j + 1), out=room))
         weight = unit**j / math.factorial(j) if j < terms else 0.0
@@ -210,10 +214,10 @@ def _sum(g: Tensor, t: Tensor, orders: list[tuple[int, int]], *, m: float, terms
                 total.mul_(scaled).add_(decay, alpha=weight * _share(j, q))
             continue
         for q in above:
-            differences = [decay * _share(j, q)]
-            for higher in above[q][:most]:
-                differences.append(higher - differences[-1])
-            above[q] = differences
+            torch.mul(decay, _share(j, q), out=fresh[q][0])
+            for n in range(most):  # the n-th difference means nothing before the n-th step, and is not used
+                torch.sub(above[q][n], fresh[q][n], out=fresh[q][n + 1])
+        above, fresh = fresh, above
         if j < terms:
             for total, (n, q) in zip(totals, orders, strict=True):
                 total.mul_(scaled).add_(above[q][n], alpha=weight)

@@ -15,10 +15,9 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import safe_divide
-
-# exp(-b^2) and erfc(b) are below 4e-44 beyond: nothing is hidden. Holds normal incidence and sigma0 = 0.
-_OPEN = 10.0
+# exp(-b^2) and erfc(b) are below 1e-35 beyond: nothing is hidden. Holds normal incidence and sigma0 = 0.
+_OPEN = 9.0
+_HIDDEN_WHERE_OPEN = 4.2e-37  # erfc of it, and a little more
 
 
 class Shadowing(NamedTuple):
@@ -37,12 +36,12 @@ class Shadowing(NamedTuple):
 
 def shadowing(cos: Tensor, sin: Tensor, *, sigma0: Tensor, tau: Tensor) -> Shadowing:
     """Shadowing of a direction with cosine > 0 and sine >= 0 to the normal, each (...); sigma0 >= 0, tau > 0 (...)."""
-    run, rise = tau * cos, 2 * sigma0 * sin
-    cut = run < _OPEN * rise
-    slope = safe_divide(tau.expand_as(cut), rise, where=cut)  # b = slope cos; 0 where nothing is hidden
+    run = tau * cos
+    # b up to _OPEN, where all is seen: 1/cos to rounding, and independent of sigma0
+    slope = tau / torch.maximum(2 * sigma0 * sin, run / _OPEN)  # b = slope cos
     b = slope * cos
     sides = math.sqrt(math.pi) * (1 + torch.erf(b))
-    over_cos = torch.where(cut, slope * sides / (b * sides + (-b * b).exp()), 1 / cos)
-    k = (sin / cos * torch.erfc(b)).masked_fill(~cut, 0.0)
-    visibility = torch.where(cut, over_cos * cos, torch.ones_like(over_cos))
-    return Shadowing(over_cos, visibility, k)
+    seen = b * sides
+    all_of_it = seen + (-b * b).exp()
+    hidden = torch.threshold(torch.erfc(b), _HIDDEN_WHERE_OPEN, 0.0)
+    return Shadowing(slope * sides / all_of_it, seen / all_of_it, sin / cos * hidden)

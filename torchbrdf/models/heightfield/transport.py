@@ -9,13 +9,14 @@ In the depth tau = -ln C_1(height) a surface without correlation is a half-space
         + \sum_{a+b=n-1} \iint S_a(i, q)\, k(-q, -q')\, S_b(q', r) \frac{dq\,dq'}{q_z q'_z}
 
 with (1 + Lambda_i + Lambda_r) S_1 = k(i, r) and k(a, b) the light that facets turn from direction a to b. All of it in
-Fourier modes f = F_0 + 2 F_1 cos(dphi) on Gauss-Legendre nodes of the polar angle.
+Fourier modes f = F_0 + 2 F_1 cos(dphi) + 2 F_2 cos(2 dphi) + .. on Gauss-Legendre nodes of the polar angle.
 """
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import torch
@@ -52,6 +53,28 @@ def polar_nodes(count: int, like: Tensor) -> Polar:
     return Polar(theta, theta.cos(), theta.sin(), math.pi**2 * weight * theta.sin())
 
 
+class Transport(Protocol):
+    """How facets light each other. Tables are kept by it: two that are equal must have one hash."""
+
+    def modes(self, slope: Tensor, nodes: Polar, orders: int) -> Tensor:
+        """F_n (..., orders, M, P, P) of n = 2 .. orders + 1 bounces at unit albedo [1/sr], modes 0 .. M - 1, M >= 2.
+
+        Symmetric in light and view, positive, and 0 for slope 0; their level is balanced by who asks for them.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class IndependentFacets:
+    """Facets that light each other as if their slopes knew nothing of each other: Smith's surface."""
+
+    def modes(self, slope: Tensor, nodes: Polar, orders: int) -> Tensor:
+        return smith_modes(slope, nodes, orders)
+
+
+INDEPENDENT_FACETS = IndependentFacets()
+
+
 def bounce_modes(
     slope: Tensor,
     occlusion: Tensor,
@@ -60,16 +83,18 @@ def bounce_modes(
     *,
     polar: int,
     orders: int,
+    transport: Transport = INDEPENDENT_FACETS,
 ) -> Tensor:
-    """F_n of n = 2 .. orders + 1 bounces at unit albedo, (..., orders, 2, polar, polar) [1/sr].
+    """F_n of n = 2 .. orders + 1 bounces at unit albedo, (..., orders, M, polar, polar) [1/sr].
 
     Args:
         slope, occlusion: rms slope s and occlusion E (...).
         constants, quadrature: of direct light, which says what the other orders have to return.
         polar: nodes of the polar angle in light and view.
+        transport: what the bounces are before they are balanced.
     """
     nodes = polar_nodes(polar, slope)
-    modes = smith_modes(slope, nodes, orders)
+    modes = transport.modes(slope, nodes, orders)
     lost = 1 - direct_albedo(slope, occlusion, constants, quadrature, nodes)
     share = modes[..., 0, :, :].sum(-3) * (nodes.solid_angle * nodes.cos)
     balance = _balance(share, lost)
@@ -78,9 +103,9 @@ def bounce_modes(
 
 def smith_modes(slope: Tensor, nodes: Polar, orders: int) -> Tensor:
     """F_n of Smith's surface, (..., orders, 2, P, P); mode 1 of even orders damped."""
-    masking = ray(slope[..., None] * nodes.sin / nodes.cos, torch.zeros_like(slope)[..., None], _SMITH).masking
+    masking = smith_masking(slope, nodes)
     extinction = (1 + masking[..., :, None] + masking[..., None, :])[..., None, :, :]
-    up, down, weight = _facet_modes(slope, nodes)
+    up, down, weight = facet_modes(slope, nodes, 2)
     kernel = up * weight @ up.mT
     into = (up * weight @ down.mT) * slope.new_tensor([1.0, -1.0])[:, None, None]  # -q lies across the azimuth of q
     inside = down * weight @ down.mT
@@ -98,8 +123,13 @@ def smith_modes(slope: Tensor, nodes: Polar, orders: int) -> Tensor:
     return torch.stack(scattered[1:], -4) / (nodes.cos[:, None] * nodes.cos) * damping[..., None, None]
 
 
+def smith_masking(slope: Tensor, nodes: Polar) -> Tensor:
+    """Lambda (..., P) of Smith's surface."""
+    return ray(slope[..., None] * nodes.sin / nodes.cos, torch.zeros_like(slope)[..., None], _SMITH).masking
+
+
 @lru_cache(maxsize=1)
-def _slope_rule() -> tuple[list[float], list[float]]:
+def slope_rule() -> tuple[list[float], list[float]]:
     """Slopes over their rms and their shares."""
     x, w = (np.array(rule) for rule in gauss_legendre_rule(_SLOPES_A_PANEL))
     radius = np.concatenate([a + (b - a) * x for a, b in pairwise(_SLOPE_PANELS)])
@@ -107,19 +137,21 @@ def _slope_rule() -> tuple[list[float], list[float]]:
     return radius.tolist(), (share / share.sum()).tolist()
 
 
-def _facet_modes(slope: Tensor, nodes: Polar) -> tuple[Tensor, Tensor, Tensor]:
-    """c_m = (1/2 pi) int (c + q cos(psi))^+ cos(m psi) dpsi of facets of each slope, towards directions above and below
-    the horizon, (..., 2, P, slope), and the facets' shares times their cosines over pi (..., 1, 1, slope).
+def facet_modes(slope: Tensor, nodes: Polar, count: int) -> tuple[Tensor, Tensor, Tensor]:
+    """c_m = (1/2 pi) int (c + q cos(psi))^+ cos(m psi) dpsi, m < count, of facets of each slope, towards directions
+    above and below the horizon, (..., count, P, slope), and the facets' shares times their cosines over pi
+    (..., 1, 1, slope).
     """
-    radii, shares = _slope_rule()
+    radii, shares = slope_rule()
     tan = slope[..., None] * slope.new_tensor(radii)
     q = tan[..., None, :] * nodes.sin[:, None]
     sides = []
     for c in (nodes.cos[:, None], -nodes.cos[:, None]):
         sine_q = safe_sqrt(q * q - c * c)
         end = torch.atan2(sine_q, -c.expand_as(q))  # facets face the direction up to this azimuth
-        sine, double = end.sin(), (2 * end).sin() / 2
-        sides.append(torch.stack((c * end + q * sine, c * sine + q * (end + double) / 2), -3) / math.pi)
+        waves = [end, *((m * end).sin() / m for m in range(1, count + 1))]
+        modes = [c * waves[m] + q * (waves[abs(m - 1)] + waves[m + 1]) / 2 for m in range(count)]
+        sides.append(torch.stack(modes, -3) / math.pi)
     weight = slope.new_tensor(shares) * torch.rsqrt(1 + tan * tan) / math.pi
     return sides[0], sides[1], weight[..., None, None, :]
 

@@ -1,13 +1,14 @@
 """Functional approximation of the integral of Oren & Nayar 1994, eqs. (27)-(29) of the long version."""
 
 import math
+from functools import partial
 from typing import Any, final
 
 import torch
 from torch import Tensor
 
 from torchbrdf import effects
-from torchbrdf._numerics import positive_part
+from torchbrdf._numerics import quotients
 from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.fields import FieldBRDF
@@ -16,6 +17,12 @@ from torchbrdf.models.oren_nayar.qualitative import QualitativeOrenNayar
 from torchbrdf.models.rungs import Member, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
+
+# (4/pi^2)^2 of C3 and (2/pi)^2 of the second bounce, with beta squared.
+_ANGLES, _BOUNCE = (4 / math.pi**2) ** 2, (2 / math.pi) ** 2
+_C2, _C3 = 0.45, 0.125 * _ANGLES
+# C1/pi, what C2 and C3 share, and the strength of the second bounce, each (a sigma^2 + b)/(sigma^2 + c).
+_QUOTIENTS = ((0.5 / math.pi, 0.33 / math.pi, 0.33), (_C2 / math.pi, 0.0, 0.09), (0.17 / math.pi, 0.0, 0.13))
 
 
 def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
@@ -46,18 +53,16 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
     """
     ALBEDO.check("oren_nayar: albedo", albedo)
     ROUGHNESS.check("oren_nayar: sigma", sigma)
-    direct, bounced = ((field * cosines.lit)[..., None] for field in fields(cosines, sigma))
+    direct, bounced = ((field * cosines.lit).unsqueeze(-1) for field in fields(cosines, sigma))
     albedo = torch.atleast_1d(albedo)
-    return albedo * (direct + albedo * bounced)
+    return albedo * torch.addcmul(direct, albedo, bounced)
 
 
 def fields(cosines: Cosines, sigma: Tensor, *, c3: bool = True) -> tuple[Tensor, Tensor]:
     """Light reflected once and twice by white facets, Oren & Nayar 1994, eqs. (27) and (28), each (...). [1/sr]"""
-    _, along, across, bounce = geometry_terms(cosines, c3=c3)
-    s2 = sigma * sigma
-    slope = s2 / (math.pi * (s2 + 0.09))
-    direct = 1 / math.pi - (0.5 / math.pi) * s2 / (s2 + 0.33) + slope * (0.45 * along + 0.125 * across)
-    return direct, (0.17 / math.pi) * s2 / (s2 + 0.13) * (1 - bounce)
+    along, turned = cosines.in_pieces(partial(_two_shapes, c3=c3))
+    flat, slope, bounce = quotients(sigma * sigma, _QUOTIENTS)
+    return torch.addcmul(flat, slope, along), torch.addcmul(bounce, bounce, turned, value=-_BOUNCE)
 
 
 def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor, Tensor, Tensor]:
@@ -67,19 +72,30 @@ def geometry_terms(cosines: Cosines, *, c3: bool = True) -> tuple[Tensor, Tensor
     sigma-quotients taken out, and cos(dphi) (2 beta/pi)^2. Every quotient left is bounded or has
     the larger cosine below it. Without `c3` the third is 0.
     """
+    along, across, turned = _shapes(cosines, c3=c3)
+    ones = torch.ones_like(along)
+    return ones, along, 0 * ones if across is None else across * _ANGLES, turned * _BOUNCE
+
+
+def _two_shapes(cosines: Cosines, *, c3: bool) -> tuple[Tensor, Tensor]:
+    """What C2 multiplies, with the term of C3 in it, and the bounce without its power of 2/pi, each (...)."""
+    along, across, turned = _shapes(cosines, c3=c3)
+    return (along if across is None else torch.add(along, across, alpha=_C3 / _C2)), turned
+
+
+def _shapes(cosines: Cosines, *, c3: bool) -> tuple[Tensor, Tensor | None, Tensor]:
+    """The last three of `geometry_terms`, without the powers of 2/pi of the last two; no second without `c3`."""
     g = cosines
-    beta_squared = g.sin_beta * g.sin_beta * g.beta_over_sine**2
-    # tan(beta) cos(dphi) = (in_plane / sin(alpha)) / cos(beta); the cubic only acts where dphi > 90 deg
-    away = positive_part(-g.in_plane)
-    cubic = away * g.sine_ratio * (2 / math.pi) ** 3 * g.beta_over_sine * beta_squared
-    along = (g.in_plane + cubic) / g.beta
-    bounce = g.in_plane * g.sine_ratio * g.beta_over_sine**2 * (2 / math.pi) ** 2
+    turned = g.in_plane * g.sine_ratio * (g.beta_over_sine * g.beta_over_sine)
+    # tan(beta) cos(dphi) = (in_plane / sin(alpha)) / cos(beta); the cubic only acts where dphi > 90 deg, where
+    # |turned| - turned is twice what -turned is (and has half its derivative at 0)
+    size = g.sin_beta * g.sin_beta * g.beta_over_sine
+    along = torch.addcmul(g.in_plane, turned.abs() - turned, size, value=0.5 * (2 / math.pi) ** 3) / g.beta
     if not c3:
-        return torch.ones_like(g.beta), along, torch.zeros_like(g.beta), bounce
+        return along, None, turned
     tan_mean = (g.sin_alpha + g.sin_beta) / (g.alpha + g.beta)
-    angles = (4 / math.pi**2) ** 2 * (g.alpha_over_sine * g.beta_over_sine) ** 2
-    across = g.across_plane * g.sin_alpha * g.sin_beta * angles * tan_mean
-    return torch.ones_like(g.beta), along, across, bounce
+    angles = g.alpha_over_sine * g.beta_over_sine
+    return along, g.across_plane * g.sine_product * tan_mean * (angles * angles), turned
 
 
 def direct_coefficients(albedo: Tensor, sigma: Tensor) -> Tensor:
@@ -153,7 +169,7 @@ class OrenNayar(CltcSampled, FieldBRDF, LinearBRDF):
         if len(fields) < 2:
             return super().sum_of(*fields)
         albedo, (direct, bounced) = torch.atleast_1d(self.albedo), fields
-        return albedo * (direct + albedo * bounced)
+        return albedo * torch.addcmul(direct, albedo, bounced)
 
     def terms(self, cosines: Cosines) -> tuple[Tensor, ...]:
         return geometry_terms(cosines, c3=self.c3)
