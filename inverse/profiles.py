@@ -4,8 +4,6 @@
 
 import numpy as np
 import torch
-from scipy.signal import savgol_filter
-from skimage.measure import profile_line
 from torch import Tensor
 
 from inverse.scene import Surface
@@ -25,6 +23,8 @@ def cross_section(image: Tensor, surface: Surface, *, rows: int = 1) -> tuple[np
         image: (rows, columns, channel).
     Returns: position in units of the half width, -1 at the left limb and 1 at the right; brightness there.
     """
+    from skimage.measure import profile_line  # deferred: draws in parts of SciPy
+
     row = belly_row(surface)
     covered = (surface.coverage()[row] > 0.5).nonzero()[:, 0]
     left, right = int(covered[0]), int(covered[-1])
@@ -35,6 +35,8 @@ def cross_section(image: Tensor, surface: Surface, *, rows: int = 1) -> tuple[np
 
 def peak_position(position: np.ndarray, brightness: np.ndarray) -> float:
     """Where a cross-section is brightest, after a cubic Savitzky-Golay filter over a sixth of it."""
+    from scipy.signal import savgol_filter  # deferred: importing it takes as long as torch
+
     window = max(5, len(brightness) // 6 | 1)
     smooth = np.asarray(savgol_filter(brightness, window, 3))
     return float(position[smooth.argmax()])

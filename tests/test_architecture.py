@@ -3,6 +3,8 @@
 import ast
 import importlib
 import inspect
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -84,8 +86,6 @@ def test_library_imports_neither_pipeline_nor_tests(path):
 
 @pytest.mark.parametrize("path", LIBRARY, ids=named)
 def test_library_needs_torch_and_numpy_alone(path):
-    import sys
-
     for module, _ in imports(path):
         top = module.split(".")[0]
         assert top in {"torchbrdf", "torch", "numpy"} or top in sys.stdlib_module_names
@@ -121,6 +121,19 @@ def test_no_module_is_hidden_by_a_public_name(package):
     door = importlib.import_module(".".join(package.relative_to(ROOT).parts))
     exported = {name for name in vars(door) if not inspect.ismodule(getattr(door, name))}
     assert not modules & exported
+
+
+# Each takes as long to import as what imports it, and most programs never use it.
+DEFERRED = ("torch._dynamo", "torch._inductor", "sympy", "scipy", "kornia", "skimage", "matplotlib", "numba")
+
+
+def test_heavy_packages_are_imported_where_they_are_used():
+    """Time is not measured: the machine's mood would be."""
+    report = "import sys, torch; before = {*sys.modules}; import inverse; print(*({*sys.modules} - before))"
+    imported = subprocess.run([sys.executable, "-c", report], cwd=ROOT, capture_output=True, text=True, check=True)
+    modules = set(imported.stdout.split())
+    assert "torchbrdf" in modules
+    assert not modules & set(DEFERRED)
 
 
 def test_few_files_lie_at_the_top_of_the_pipeline():

@@ -13,6 +13,8 @@ import torch
 from numpy.polynomial import Chebyshev, Polynomial
 from torch import Tensor
 
+from torchbrdf._constants import constant
+
 # acos(c)/sqrt(1 - c^2) is analytic on [0, 1]; interpolation there errs by about 6^-degree.
 _ANGLE_DEGREE = {torch.float64: 20, torch.float32: 9}
 # A normalised vector is of unit length to a few rounding errors; data stored with six digits is not.
@@ -21,17 +23,22 @@ _UNIT_TOLERANCE_IN_EPS = 64
 _TIP = {torch.float64: 1e-12, torch.float32: 1e-6}
 
 
-def _angle_over_sine_polynomial(degree: int) -> tuple[float, ...]:
+@constant
+@functools.cache
+def _angle_over_sine_polynomial(dtype: torch.dtype) -> tuple[float, ...]:
     """Coefficients, highest power first, of acos(c)/sqrt(1 - c^2) in x = 1 - c, where its series is positive."""
 
     def ratio(x):  # the half-angle form keeps its digits at c = 1
         return 2 * np.arctan2(np.sqrt(x), np.sqrt(2 - x)) / np.sqrt(x * (2 - x))
 
+    degree = _ANGLE_DEGREE[dtype]
     in_powers = Chebyshev.interpolate(ratio, degree, domain=[0, 1]).convert(kind=Polynomial, domain=[-1, 1])
     return tuple(float(k) for k in in_powers.coef[::-1])
 
 
-def _sine_excess_polynomial(degree: int) -> tuple[float, ...]:
+@constant
+@functools.cache
+def _sine_excess_polynomial(dtype: torch.dtype) -> tuple[float, ...]:
     """Coefficients, highest power first, of (1 - c acos(c)/sqrt(1 - c^2))/(1 - c^2) in x = 2c - 1."""
 
     def excess(x):
@@ -45,12 +52,10 @@ def _sine_excess_polynomial(degree: int) -> tuple[float, ...]:
             series, term = series + term, term * sine_squared * (2 * k) / (2 * k + 3)
         return np.where(sine_squared < 0.3, series, closed)
 
-    in_powers = Chebyshev.interpolate(excess, degree).convert(kind=Polynomial)
+    in_powers = Chebyshev.interpolate(excess, _ANGLE_DEGREE[dtype]).convert(kind=Polynomial)
     return tuple(float(k) for k in in_powers.coef[::-1])
 
 
-_ANGLE_OVER_SINE = {dtype: _angle_over_sine_polynomial(n) for dtype, n in _ANGLE_DEGREE.items()}
-_SINE_EXCESS = {dtype: _sine_excess_polynomial(n) for dtype, n in _ANGLE_DEGREE.items()}
 # Up to so many numbers an operation costs its call: two together cost half as much as one after the other. Beyond, what
 # costs is the memory they fill.
 FEW = 4096
@@ -75,6 +80,8 @@ Components = tuple[Tensor, Tensor, Tensor]
 def components(vector: Tensor) -> Components:
     """x, y and z (...) of vectors (..., 3), each in one piece of memory: strided ones take five times as long."""
     x, y, z = vector.unbind(-1)
+    if torch.compiler.is_compiling():  # the compiled loop reads them where they are
+        return x, y, z
     return (x.contiguous(), y.contiguous(), z.contiguous()) if vector.is_contiguous() else (x, y, z)
 
 
@@ -195,12 +202,12 @@ def angle_over_sine(cosine: Tensor) -> Tensor:
 
     Relative error below 5e-15 in float64 and 2e-7 in float32.
     """
-    return polynomial(_ANGLE_OVER_SINE[cosine.dtype], number(1.0, cosine) - cosine)
+    return polynomial(_angle_over_sine_polynomial(cosine.dtype), number(1.0, cosine) - cosine)
 
 
 def sine_excess(cosine: Tensor) -> Tensor:
     """(sin(theta) - theta cos(theta))/sin^3(theta) for cos(theta) in [0, 1]: 1/3 at theta = 0, smooth there."""
-    return polynomial(_SINE_EXCESS[cosine.dtype], 2 * cosine - 1)
+    return polynomial(_sine_excess_polynomial(cosine.dtype), 2 * cosine - 1)
 
 
 def polynomial(coefficients: tuple[float, ...], x: Tensor) -> Tensor:

@@ -52,7 +52,8 @@ class _computed_once:  # noqa: N801 - used as a decorator
 
     def __get__(self, instance: "Cosines", owner: type) -> Any:
         value = self.compute(instance)
-        if torch.is_grad_enabled() or not (instance.light.requires_grad or torch.is_inference_mode_enabled()):
+        kept_without = torch.compiler.is_compiling() or not torch.is_inference_mode_enabled()
+        if torch.is_grad_enabled() or (kept_without and not instance.light.requires_grad):
             instance.__dict__[self.name] = value  # found before this descriptor from now on
         return value
 
@@ -115,8 +116,36 @@ class Cosines:
         return result
 
     @classmethod
-    def _from_components(cls, n: Components, s: Components, v: Components) -> "Cosines":
-        return cls.from_products(dot_of(n, s), dot_of(n, v), dot_of(s, v))
+    def of_components(cls, normal: Components, light: Components, view: Components) -> "Cosines":
+        """What `of` makes of vectors, from their components x, y and z, each (...) in memory of its own.
+
+        Where the components of an image lie side by side, each in its own array, processors read whole vectors of
+        pixels at once; of (..., 3) only every third number belongs to one component. `vectors` are put together from
+        them: in a compiled graph that costs nothing where no model reads them.
+
+        Args:
+            normal, light, view: three tensors (...) each, of unit vectors, float32 or float64, all of one dtype.
+        Raises: what `of` raises, and ValueError for other than three components.
+
+        >>> x, y = torch.tensor([0.0, 0.6]), torch.zeros(2)
+        >>> z = torch.tensor([1.0, 0.8])
+        >>> Cosines.of_components((y, y, 1 + y), (x, y, z), (y, y, 1 + y)).light
+        tensor([1.0000, 0.8000])
+        """
+        given = {"normal": normal, "light": light, "view": view}
+        for name, parts in given.items():
+            if len(parts) != 3:
+                raise ValueError(f"{name} must have three components x, y, z, each (...); found {len(parts)}.")
+        vectors = {name: _put_together(name, parts) for name, parts in given.items()}
+        if not taken_on_trust():
+            _check_shapes(vectors)
+            squares = [dot_of(v, v).detach() for v in given.values()]
+            extremes = [limit for squared in squares if squared.numel() for limit in torch.aminmax(squared)]
+            if extremes and not holds((torch.stack(extremes) - 1).abs() <= unit_tolerance(extremes[0].dtype)):
+                _refuse_other_than_unit(**vectors)
+        result = cls.from_products(dot_of(normal, light), dot_of(normal, view), dot_of(light, view))
+        result.__dict__.update(vectors=tuple(vectors.values()))
+        return result
 
     @classmethod
     def from_products(cls, light: Tensor, view: Tensor, phase: Tensor) -> "Cosines":
@@ -345,6 +374,18 @@ def _check_shapes(vectors: dict[str, Tensor]) -> None:
     except RuntimeError:
         given = ", ".join(f"{name} {tuple(v.shape)}" for name, v in vectors.items())
         raise ValueError(f"{_listed(vectors)} must broadcast; found {given}.") from None
+
+
+def _put_together(name: str, parts: Components) -> Tensor:
+    if not all(isinstance(part, Tensor) for part in parts):
+        raise TypeError(
+            f"{name} must be three tensors x, y, z; found {', '.join(type(part).__name__ for part in parts)}."
+        )
+    try:
+        return torch.stack(torch.broadcast_tensors(*parts), -1)
+    except RuntimeError:
+        shapes = ", ".join(str(tuple(part.shape)) for part in parts)
+        raise ValueError(f"{name} must be three tensors that broadcast; found {shapes}.") from None
 
 
 def _listed(vectors: dict[str, Tensor]) -> str:

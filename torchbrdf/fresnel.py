@@ -21,7 +21,8 @@ from torchbrdf.parameters import (
 from torchbrdf.quadrature import gauss_legendre
 
 # Relative index of a dielectric seen from either side; total internal reflection below 1.
-RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1)
+# No matter has an index nearer to 0 than a hundredth; at 0 itself the formulas are 0/0.
+RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1, least=0.01)
 
 
 def schlick(cos: Tensor, *, f0: Tensor) -> Tensor:
@@ -87,7 +88,7 @@ def conductor(cos: Tensor, *, eta: Tensor, k: Tensor) -> Tensor:
 
     Args:
         cos: cosine c of incidence, broadcasts with eta and k. [-] in (0, 1]
-        eta, k: real and imaginary part of the relative index. [-] > 0, >= 0
+        eta, k: real and imaginary part of the relative index. [-] > 0, >= 0; 0/0 at 0 and 0
     Returns: F, shapes broadcast. [-]
     Deviations: none; k = 0 is `dielectric`.
     Source: Born & Wolf 1999, Principles of Optics, 7th edition, DOI 10.1017/CBO9781139644181, ch. 14.
@@ -255,7 +256,7 @@ class Dielectric(Fresnel):
 
 @final
 class Conductor(Fresnel):
-    """`conductor` with complex index eta + i k, each scalar, (channel,) or (..., channel). [-] > 0, > 0"""
+    """`conductor` with complex index eta + i k, each scalar, (channel,) or (..., channel). [-] >= 0.01, >= 0"""
 
     eta: Constrained = Constrained(RELATIVE_INDEX)
     k: Constrained = Constrained(ABSORPTION_INDEX)

@@ -19,6 +19,7 @@ class Interval:
     `unit` is "rad", or "" for a pure number. `even` says that reflectance depends on the square of the
     parameter near low = 0, so that its derivative vanishes there: sigma is told from 0 through sigma^2.
     `trailing` axes of the parameter are its own (channel, part); axes before them are pixels.
+    `least`, where it is above low, is the smallest value that a formula can compute: no value below it is accepted.
 
     The closed interval is what a formula accepts. A trained value lives in the open one, through a
     logistic map (an exponential where high is infinite): it approaches a bound until rounding sees no
@@ -30,6 +31,7 @@ class Interval:
     unit: str = ""
     even: bool = False
     trailing: int = 0
+    least: float = -math.inf
 
     @property
     def angular(self) -> bool:
@@ -48,8 +50,11 @@ class Interval:
         if value.numel() == 0:
             return
 
+        low = max(self.low, self.least)
+
         def inside_of(x: Tensor) -> Tensor:
-            return (x > self.low) & (x < self.high) if open_ends else (x >= self.low) & (x <= self.high)
+            above = x > low if open_ends and low == self.low else x >= low
+            return above & (x < self.high if open_ends else x <= self.high)
 
         # the extremes stand for all: those of what holds a NaN are NaN, which lies nowhere
         if holds(inside_of(torch.stack(torch.aminmax(value.detach())))):
@@ -57,12 +62,12 @@ class Interval:
         inside = inside_of(value)
         finite = value[value.isfinite()]
         extent = f"min {finite.min():.6g}, max {finite.max():.6g}" if finite.numel() else "none is finite"
-        opening = "(" if open_ends else "["
+        opening = "(" if open_ends and low == self.low else "["
         closing = ")" if open_ends or math.isinf(self.high) else "]"
         unit = f" {self.unit}" if self.unit else ""
         remedy = " A trained value cannot sit on a bound: hold it there with fixed(...)." if open_ends else ""
         raise ValueError(
-            f"{name} must lie in {opening}{self.low:.4g}, {self.high:.4g}{closing}{unit}; "
+            f"{name} must lie in {opening}{low:.4g}, {self.high:.4g}{closing}{unit}; "
             f"{int((~inside).sum())} of {inside.numel()} entries do not ({extent}).{remedy}"
         )
 
@@ -131,6 +136,7 @@ EXPONENT = Interval(0.0, math.inf)
 # Below this microfacet width the lobe is narrower than float32 cosines resolve: use Mirror.
 NARROWEST = 1e-3
 WIDTH = Interval(NARROWEST, 1.0)
+FACET_ROUGHNESS = Interval(0.0, math.pi / 2, "rad", even=True, least=NARROWEST)
 REFRACTIVE_INDEX = Interval(1.0, math.inf, trailing=1)
 ABSORPTION_INDEX = Interval(0.0, math.inf, trailing=1)
 

@@ -2,11 +2,13 @@
 
 from functools import lru_cache
 
-import torch
 from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
+from torchbrdf._constants import constant
 
+
+@constant
 @lru_cache(maxsize=64)
 def gauss_legendre_rule(order: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Gauss-Legendre nodes and weights on (0, 1), `order` numbers each."""
@@ -14,12 +16,7 @@ def gauss_legendre_rule(order: int) -> tuple[tuple[float, ...], tuple[float, ...
     return tuple((0.5 * (nodes + 1)).tolist()), tuple((0.5 * weights).tolist())
 
 
-@torch.compiler.assume_constant_result
-def _constant_rule(order: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return gauss_legendre_rule(order)
-
-
 def gauss_legendre(order: int, like: Tensor) -> tuple[Tensor, Tensor]:
     """Gauss-Legendre nodes and weights on (0, 1), each (order,), in the dtype and on the device of `like`."""
-    nodes, weights = _constant_rule(order)
+    nodes, weights = gauss_legendre_rule(order)
     return like.new_tensor(nodes), like.new_tensor(weights)

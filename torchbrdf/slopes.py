@@ -18,6 +18,7 @@ from functools import lru_cache
 import torch
 from torch import Tensor
 
+from torchbrdf._constants import constant
 from torchbrdf._numerics import positive, quiet_width, sinc
 from torchbrdf.quadrature import gauss_legendre, gauss_legendre_rule
 
@@ -26,21 +27,17 @@ _MOMENT_NODES = 64  # the moments are integrals of an analytic function over at 
 _MOMENT_WIDTH = 9.0  # exp(-81/2) is below the rounding of float64
 
 
+@constant
 @lru_cache(maxsize=32)
 def _slope_angles(count: int) -> tuple[float, ...]:
     return (0.0, *(_QUARTER_TURN * node for node in gauss_legendre_rule(count - 1)[0]))
-
-
-@torch.compiler.assume_constant_result
-def _constant_slope_angles(count: int) -> tuple[float, ...]:
-    return _slope_angles(count)
 
 
 def shared_slopes(count: int) -> tuple[float, ...]:
     """The `count` shared slope angles: 0 and the Gauss-Legendre nodes of (0, pi/2), ascending. [rad]"""
     if count < 3:
         raise ValueError(f"nodes must be at least 3 (the flat facet and two slopes); found {count}.")
-    return _constant_slope_angles(count)
+    return _slope_angles(count)
 
 
 def gaussian_moments(sigma: Tensor) -> tuple[Tensor, Tensor]:

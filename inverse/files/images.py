@@ -7,7 +7,6 @@ from pathlib import Path
 import kornia_rs
 import numpy as np
 import torch
-from kornia.color import rgb_to_linear_rgb
 from PIL import Image
 from tifffile import TiffFile, TiffPage
 from torch import Tensor
@@ -58,6 +57,8 @@ def read_image(path: str | Path, color: str = "linear", *, max_pixels: int = MAX
         raise ValueError(f"{path}: pixels must be finite, in [0, 1]; {int(broken.sum())} of {broken.numel()} are not.")
     if color == "linear":
         return image
+    from kornia.color import rgb_to_linear_rgb  # deferred: kornia imports all of itself
+
     linear = rgb_to_linear_rgb(image.movedim(-1, 0).expand(3, -1, -1)).movedim(0, -1)
     return linear[..., : image.shape[-1]].contiguous()
 

@@ -25,6 +25,8 @@ _LONGEST_STEP = 2.0
 _FARTHEST = {torch.float64: 30.0, torch.float32: 14.0}
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-12, 1e12
 _PROGRESS_AFTER_SECONDS = 2.0
+# Unknowns in whose directions the residuals are differentiated at once.
+_TOGETHER = 8
 
 
 class Residuals:
@@ -41,20 +43,21 @@ class Residuals:
 
     def by_shared(self, shared: Tensor, own: Tensor) -> Tensor:
         """Derivatives (G, image, pixel, channel)."""
-        still = torch.zeros_like(own)
-        columns = [self._along(shared, own, tangent, still) for tangent in torch.eye(len(shared)).to(shared)]
-        return torch.stack(columns)
+        still = own.new_zeros(len(shared), 1, own.shape[1])
+        return self._along(shared, own, torch.eye(len(shared)).to(shared), still)
 
     def by_own(self, shared: Tensor, own: Tensor) -> Tensor:
         """Derivatives (L, image, pixel, channel), each by the unknown of the pixel itself."""
-        still = torch.zeros_like(shared)
-        # one sweep moves this unknown of every pixel at once
-        tangents = [torch.zeros_like(own).index_fill(1, torch.tensor(k), 1.0) for k in range(own.shape[1])]
-        columns = [self._along(shared, own, still, tangent) for tangent in tangents]
-        return torch.stack(columns)
+        entries = own.shape[1]  # each sweep moves this unknown of every pixel at once
+        return self._along(shared, own, shared.new_zeros(entries, len(shared)), torch.eye(entries).to(own)[:, None])
 
     def _along(self, shared: Tensor, own: Tensor, d_shared: Tensor, d_own: Tensor) -> Tensor:
-        return torch.func.jvp(self, (shared, own), (d_shared, d_own))[1]
+        """Along several directions (unknown, G) and (unknown, 1, L): what does not move is computed once for all."""
+
+        def slope(d_shared: Tensor, d_own: Tensor) -> Tensor:
+            return torch.func.jvp(self, (shared, own), (d_shared, d_own.expand(own.shape)))[1]
+
+        return torch.vmap(slope, chunk_size=_TOGETHER)(d_shared, d_own)
 
 
 @dataclass(frozen=True)

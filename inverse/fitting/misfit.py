@@ -1,9 +1,9 @@
 """Residuals that are no noise: what a fit that has converged may still be wrong about."""
 
 import math
+from statistics import NormalDist
 
 import torch
-from scipy.stats import chi2, norm
 from torch import Tensor
 
 from inverse.scene import Sensor
@@ -30,6 +30,8 @@ def warnings_of(sensor: Sensor, predicted: Tensor, residuals: Tensor, used: Tens
     """
     if not sensor.noisy:
         return ()
+    from scipy.special import chdtri  # deferred: half a second
+
     variance = sensor.variance(predicted)
     if sensor.bits is not None:
         variance = variance + (1 / (2**sensor.bits - 1)) ** 2 / 12
@@ -40,10 +42,10 @@ def warnings_of(sensor: Sensor, predicted: Tensor, residuals: Tensor, used: Tens
         return ()
     notes = []
     widths = (sums / counts.clamp(min=1)).sqrt()
-    if float(sums.sum()) > chi2.isf(_FALSE_ALARMS, freedom):
+    if float(sums.sum()) > chdtri(freedom, _FALSE_ALARMS):
         wider = math.sqrt(float(sums.sum()) / freedom)
         notes.append(f"the residuals are {wider:.2g} times as wide as the sensor's noise")
-    limits = torch.tensor(chi2.isf(_FALSE_ALARMS / len(counts), counts.clamp(min=1).numpy()))
+    limits = torch.tensor(chdtri(counts.clamp(min=1).numpy(), _FALSE_ALARMS / len(counts)))
     loud = ((sums > limits) & (counts > 0)).nonzero()[:, 0].tolist()
     typical = widths[counts > 0].median()
     outstanding = [k for k in loud if widths[k] > _OUTSTANDING * typical]
@@ -65,6 +67,6 @@ def _by_brightness(predicted: Tensor, residuals: Tensor, variance: Tensor, used:
     sums = torch.bincount(place, z, minlength=10)[counts > 0]
     counts = counts[counts > 0]
     worst = float((sums.abs() / counts.sqrt()).max())
-    if worst <= norm.isf(_FALSE_ALARMS / 2 / len(counts)):
+    if worst <= -NormalDist().inv_cdf(_FALSE_ALARMS / 2 / len(counts)):
         return ()
     return ("the residuals follow the brightness: model, exposure or linearity may be off",)

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from inverse.planning.sampling_detail import borders
 from inverse.scene import Scene, pixel_average
-from inverse.transport import unhidden
+from inverse.transport import Shadows, unhidden
 
 # Bins of a polar angle, from along the axis to perpendicular, and beyond.
 _VIEW_BINS, _LIGHT_BINS = 6, 9
@@ -60,8 +60,9 @@ def _strata(scene: Scene) -> tuple[Tensor, Tensor]:
     view = surface.view if surface.view.ndim == 1 else mean(surface.view)
     number = _bin((normals * view).sum(-1), _VIEW_BINS) * 2 + (coverage[shown] == 1)
     number = number * 4 + 2 * (normals[:, 0] > 0) + (normals[:, 1] > 0)
+    shadows = Shadows(surface.solid, points, normals)
     for light in scene.beams()[:_LIGHTS]:
-        arrival = next(unhidden(light, points, normals, surface.solid))
+        arrival = next(unhidden(light, shadows))
         number = number * (_LIGHT_BINS + 1) + _bin((normals * arrival.direction).sum(-1), _LIGHT_BINS)
         if light.why_shadowless(surface.solid) is None:
             lit = arrival.irradiance.amax(-1) > 0

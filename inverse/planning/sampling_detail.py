@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from inverse.scene import Footprints, Scene
-from inverse.transport import render, unhidden
+from inverse.transport import Shadows, render, unhidden
 from torchbrdf import BRDF
 
 # Shares of the pixels, smoothest first, that are tried with one sample.
@@ -50,9 +50,10 @@ def _shadow_edges(scene: Scene, footprints: Footprints) -> Tensor:
     """Pixels (rows, columns) that the edge of an attached or a cast shadow may cross."""
     spread = scene.surface.spread_of_normals()
     edge = torch.zeros_like(spread, dtype=torch.bool)
-    points, normals, solid = footprints.points, footprints.normals, footprints.solid if scene.shadows else None
+    normals = footprints.normals
+    shadows = Shadows(footprints.solid if scene.shadows else None, footprints.points, normals)
     for light in scene.beams():
-        arrival = next(unhidden(light, points, normals, solid))
+        arrival = next(unhidden(light, shadows))
         cosine = (normals * arrival.direction).sum(-1)
         # normals that spread by an angle a leave a mean of length about 1 - a^2/4 at most
         width = 2 * (2 * spread).sqrt().flatten()[footprints.pixel]

@@ -1,16 +1,19 @@
 """A perspective camera: kornia's pinhole, in this package's frame."""
 
 import math
+from typing import TYPE_CHECKING
 
 import torch
-from kornia.geometry.camera import PinholeCamera
 from torch import Tensor
 
 from inverse.scene.surface import TO_CAMERA, Surface, seen
 from inverse.shapes import Solid
 
+if TYPE_CHECKING:
+    from kornia.geometry.camera import PinholeCamera
 
-def pinhole(height: int, width: int, *, field_of_view: float = 30.0, distance: float | None = None) -> PinholeCamera:
+
+def pinhole(height: int, width: int, *, field_of_view: float = 30.0, distance: float | None = None) -> "PinholeCamera":
     """kornia's pinhole camera on the z axis, looking at the origin.
 
     Args:
@@ -22,6 +25,8 @@ def pinhole(height: int, width: int, *, field_of_view: float = 30.0, distance: f
         turn this package's frame (y up, z towards the camera) into that.
     Raises: ValueError outside these domains.
     """
+    from kornia.geometry.camera import PinholeCamera  # deferred: kornia imports all of itself
+
     if not (isinstance(height, int) and isinstance(width, int) and height >= 1 and width >= 1):
         raise ValueError(f"height and width must be whole numbers of at least 1; found {height} and {width}.")
     if not 0 < field_of_view < 180:
@@ -40,7 +45,7 @@ def pinhole(height: int, width: int, *, field_of_view: float = 30.0, distance: f
 
 
 def perspective(
-    solid: Solid, camera: PinholeCamera, *, samples: int = 1, dtype: torch.dtype = torch.float32
+    solid: Solid, camera: "PinholeCamera", *, samples: int = 1, dtype: torch.dtype = torch.float32
 ) -> Surface:
     """A solid as a pinhole camera sees it: each pixel with its own view direction.
 
@@ -60,8 +65,10 @@ def perspective(
     return surface
 
 
-def _rays(camera: PinholeCamera, samples: int) -> tuple[Tensor, Tensor]:
+def _rays(camera: "PinholeCamera", samples: int) -> tuple[Tensor, Tensor]:
     """The camera's centre (3,) and the unit directions (rows, columns, 3) of its sample points, float64."""
+    from kornia.geometry.camera import PinholeCamera
+
     rows, columns = (
         (torch.arange(int(count) * samples, dtype=torch.float64) + 0.5) / samples - 0.5
         for count in (camera.height, camera.width)

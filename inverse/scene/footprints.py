@@ -1,6 +1,6 @@
 """The points at which an image is shaded, and how they make up its pixels."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -58,30 +58,49 @@ class Footprints:
         """
         rows, columns = surface.resolution
         s, mask = surface.samples, surface.mask
-        wide = torch.arange(rows * columns, device=mask.device).reshape(rows, columns)
-        pixel = wide.repeat_interleave(s, 0).repeat_interleave(s, 1)
-        merged = torch.zeros_like(wide, dtype=torch.bool)
-        if fully_sampled is not None:
-            if fully_sampled.shape != (rows, columns) or fully_sampled.dtype != torch.bool:
-                got = f"{fully_sampled.dtype} {tuple(fully_sampled.shape)}"
-                raise ValueError(f"fully_sampled must be bool of shape {(rows, columns)}; found {got}.")
-            if s > 1:
-                merged = ~fully_sampled & (surface.coverage() == 1)
-        kept = mask & ~merged.repeat_interleave(s, 0).repeat_interleave(s, 1)
+        if fully_sampled is None:
+            return cls._of_points(surface, mask)
+        if fully_sampled.shape != (rows, columns) or fully_sampled.dtype != torch.bool:
+            got = f"{fully_sampled.dtype} {tuple(fully_sampled.shape)}"
+            raise ValueError(f"fully_sampled must be bool of shape {(rows, columns)}; found {got}.")
+        if s == 1:
+            return cls._of_points(surface, mask)
+        merged = ~fully_sampled & (surface.coverage() == 1)
+        fine = cls._of_points(surface, mask & ~merged.repeat_interleave(s, 0).repeat_interleave(s, 1))
         upright = _unit(pixel_average(surface.normals, s)[merged])
         middle = pixel_average(surface.points, s)[merged]
         # the tangent planes of a bulge's points pass above it, and their mean below
         rise = ((_blocks(surface.points, s)[merged] - middle[:, None]) * _blocks(surface.normals, s)[merged]).sum(-1)
         middle = middle + rise.amax(-1, keepdim=True).clamp(min=0) * upright
-        weight = surface.normals.new_full((int(kept.sum()),), 1 / s**2)
+        view = fine.view
+        if surface.view.ndim > 1:
+            view = torch.cat((view, _unit(pixel_average(surface.view, s)[merged])))
+        whole = merged.flatten().nonzero()[:, 0]
+        return replace(
+            fine,
+            points=torch.cat((fine.points, middle)),
+            normals=torch.cat((fine.normals, upright)),
+            view=view,
+            pixel=torch.cat((fine.pixel, whole)),
+            weight=torch.cat((fine.weight, fine.weight.new_ones(len(whole)))),
+        )
+
+    @classmethod
+    def _of_points(cls, surface: Surface, mask: Tensor) -> "Footprints":
+        """Those of a mask (rows, columns) of the surface's points, each an equal share of its pixel."""
+        (rows, columns), s = surface.resolution, surface.samples
+        at = mask.flatten().nonzero()[:, 0]  # gathers rows several times as fast as the mask does
+        pixel = torch.arange(rows * columns, device=mask.device).reshape(rows, 1, columns, 1)
+        points, normals, view = (
+            k if k.ndim == 1 else k.reshape(-1, 3).index_select(0, at)
+            for k in (surface.points, surface.normals, surface.view)
+        )
         return cls(
-            torch.cat((surface.points[kept], middle)),
-            torch.cat((surface.normals[kept], upright)),
-            surface.view
-            if surface.view.ndim == 1
-            else torch.cat((surface.view[kept], _unit(pixel_average(surface.view, s)[merged]))),
-            torch.cat((pixel[kept], wide[merged])),
-            torch.cat((weight, weight.new_ones(int(merged.sum())))),
+            points,
+            normals,
+            view,
+            pixel.expand(rows, s, columns, s).reshape(-1).index_select(0, at),
+            normals.new_full((len(at),), 1 / s**2),
             (rows, columns),
             surface.solid,
         )

@@ -1,8 +1,6 @@
 """Surfaces from what others measured: normal maps and depth maps."""
 
 import torch
-from kornia.filters import spatial_gradient
-from kornia.geometry.depth import depth_to_3d_v2, depth_to_normals
 from torch import Tensor
 from torch.nn.functional import max_pool2d
 
@@ -47,6 +45,9 @@ def from_depth(depth: Tensor, camera_matrix: Tensor | None = None, mask: Tensor 
     """
     if depth.ndim != 2:
         raise ValueError(f"depth must have shape (rows, columns); found {tuple(depth.shape)}.")
+    from kornia.filters import spatial_gradient  # deferred: kornia imports all of itself
+    from kornia.geometry.depth import depth_to_3d_v2, depth_to_normals
+
     object_ = (depth.isfinite() & (depth > 0)) if mask is None else mask.bool() & depth.isfinite()
     filled = torch.where(object_, depth, torch.zeros_like(depth))[None, None]
     outside = (~object_).to(depth.dtype)[None, None]

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import torch
-from kornia.filters import gaussian_blur2d
 from torch import Tensor
 
 
@@ -51,6 +50,8 @@ class Sensor:
         """Blur images (..., rows, columns, channel) by the point-spread function; borders reflect."""
         if self.psf_sigma == 0:
             return image
+        from kornia.filters import gaussian_blur2d  # deferred: kornia imports all of itself
+
         size = 2 * int(4 * self.psf_sigma + 1) + 1  # 4 sigma on each side holds 99.99 %
         stack = image.flatten(0, -4) if image.ndim > 3 else image[None]
         blurred = gaussian_blur2d(stack.movedim(-1, 1), size, (self.psf_sigma, self.psf_sigma))

@@ -9,13 +9,17 @@ pixel into s x s points, which the shading averages.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import torch
-from scipy.interpolate import CubicSpline
 from torch import Tensor
 from torch.nn.functional import normalize
 
 from inverse.shapes import Cuboid, Cylinder, Plane, Revolution, Solid, Sphere
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 TO_CAMERA = (0.0, 0.0, 1.0)
 # Heights and radii of the default vase: foot, waist, belly, shoulder, neck, lip.
@@ -105,16 +109,23 @@ def pixel_grid(height: int, width: int, *, samples: int = 1, dtype: torch.dtype 
     return x, y
 
 
-def vase_profile() -> CubicSpline:
+def vase_profile() -> "CubicSpline":
     """Radius of the default clay vase as a smooth function of height, defined on [-0.92, 0.92]."""
+    from scipy.interpolate import CubicSpline  # deferred: half a second
+
     return CubicSpline(_VASE_HEIGHTS, _VASE_RADII, extrapolate=False)
 
 
 def vase(height: int = 512, width: int = 512, *, samples: int = 1, dtype: torch.dtype = torch.float32) -> Surface:
     """The default vase seen from the front."""
+    return _front_of(_vase_solid(), height, width, samples, dtype)
+
+
+@lru_cache(maxsize=1)
+def _vase_solid() -> Revolution:
+    """One for all images: what is remembered of a solid, such as the light between its parts, is found again."""
     profile = vase_profile()
-    solid = Revolution(profile, profile.derivative(), _VASE_HEIGHTS[0], _VASE_HEIGHTS[-1])
-    return _front_of(solid, height, width, samples, dtype)
+    return Revolution(profile, profile.derivative(), _VASE_HEIGHTS[0], _VASE_HEIGHTS[-1])
 
 
 def revolution(

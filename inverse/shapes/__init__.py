@@ -3,7 +3,7 @@
 from inverse.shapes.form_factors import Exchange
 from inverse.shapes.height_field import HeightField
 from inverse.shapes.patches import Patches
-from inverse.shapes.rays import lifted
+from inverse.shapes.rays import dots, lifted
 from inverse.shapes.revolution import Revolution
 from inverse.shapes.solids import Absence, Body, Cuboid, Cylinder, Group, Plane, Solid, Sphere
 
@@ -20,5 +20,6 @@ __all__ = [
     "Revolution",
     "Solid",
     "Sphere",
+    "dots",
     "lifted",
 ]

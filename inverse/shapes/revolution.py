@@ -3,11 +3,13 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from inverse.shapes.climbing import Ascent, Climb
 from inverse.shapes.form_factors import Exchange, RingExchange
 from inverse.shapes.patches import Patches, disc, joined
 from inverse.shapes.rays import box, row
@@ -75,9 +77,9 @@ class Revolution(Body):
         """By height, as a ray climbs or falls steadily: between two heights the squared distance from the axis is a
         parabola, which is below the straight r(y)^2 somewhere or nowhere: however level a ray, it skips nothing.
         """
-        origin, direction = torch.broadcast_tensors(origin.double(), direction.double())
-        start, along = origin.reshape(-1, 3), direction.reshape(-1, 3)
-        reach = torch.as_tensor(reach).to(start).expand(origin.shape[:-1]).reshape(-1)
+        shape = torch.broadcast_shapes(origin.shape, direction.shape)[:-1]
+        start, along = (k.double().expand(*shape, 3).reshape(-1, 3) for k in (origin, direction))
+        reach = torch.as_tensor(reach).to(start).expand(shape).reshape(-1)
         blocked = torch.zeros(len(start), dtype=torch.bool, device=start.device)
         enter, leave = self._box(start, along)
         enter, leave = enter.clamp(min=0), torch.minimum(leave, reach)
@@ -86,8 +88,9 @@ class Revolution(Body):
             rays = (same_way & (enter < leave)).nonzero()[:, 0]
             if len(rays):
                 span = enter[rays], leave[rays]
-                blocked[rays] = self._climb(start[rays], along[rays], reach[rays], span, flip)
-        return blocked.reshape(origin.shape[:-1])
+                ascent = self._ascent(start[rays], along[rays], reach[rays], span, flip)
+                blocked[rays] = self._climbs[flip].to(start.device).blocked(ascent)
+        return blocked.reshape(shape)
 
     def why_unshaded(self, direction: Tensor | None) -> Absence | None:
         # a level ray stays in a cross-section; from a point of a disc that faces the light it leaves the disc
@@ -134,37 +137,25 @@ class Revolution(Body):
         sizes = row((widest, (self.high - self.low) / 2, widest), origin)
         return box(origin - row((0.0, (self.low + self.high) / 2, 0.0), origin), direction, sizes)
 
-    def _climb(
-        self, origin: Tensor, direction: Tensor, reach: Tensor, span: tuple[Tensor, Tensor], flip: bool
-    ) -> Tensor:
-        """`blocks` (ray,) between two distances, for rays that all climb, or with `flip` all fall (the solid is turned
-        over for them)."""
-        enter, leave = span
-        nodes = torch.linspace(self.low, self.high, self.steps + 1, dtype=torch.float64, device=origin.device)
+    @cached_property
+    def _climbs(self) -> tuple[Climb, Climb]:
+        """The profile as it is, and turned over for rays that fall."""
+        nodes = torch.linspace(self.low, self.high, self.steps + 1, dtype=torch.float64)
         squared = self._radii(nodes).square()
+        return Climb(nodes, squared), Climb(-nodes.flip(0), squared.flip(0))
+
+    def _ascent(
+        self, origin: Tensor, direction: Tensor, reach: Tensor, span: tuple[Tensor, Tensor], flip: bool
+    ) -> Ascent:
+        """Rays that all climb, or with `flip` all fall, between two distances."""
         level, rise = origin[:, 1], direction[:, 1].abs().clamp(min=_LEVEL)
         end = level + reach * (-rise if flip else rise)
-        own, end_squared = self._radii(level).square(), self._radii(end).square()
+        own, end_squared = (self._radii(k).square() for k in (level, end))
         if flip:
-            nodes, squared, level, end = -nodes.flip(0), squared.flip(0), -level, -end
+            level, end = -level, -end
         flat = row((1.0, 0.0, 1.0), origin)
         a, b, c = (k.sum(-1) for k in ((origin * flat) ** 2, origin * direction * flat, (direction * flat) ** 2))
-        blocked = torch.zeros_like(level, dtype=torch.bool)
-        # the heights of both ends of the ray are nodes too, so that the chords touch the surface there
-        below, below_squared = level, own
-        for shared, shared_squared in zip(nodes, squared, strict=True):
-            ahead, over = shared > level, shared > end
-            node, node_squared = end.minimum(shared), torch.where(over, end_squared, shared_squared)
-            first = ((below - level) / rise).maximum(enter)
-            last = ((node - level) / rise).minimum(leave)
-            slope = (node_squared - below_squared) / (node - below)
-            # a + 2 b t + c t^2 less the chord, at its lowest between first and last (0/0: upright by a straight wall)
-            chord, drop = below_squared + slope * (level - below), slope * rise
-            lowest = ((drop / 2 - b) / c).nan_to_num(0.0).maximum(first).minimum(last)
-            gap = a - chord + lowest * (2 * b - drop + c * lowest)
-            blocked |= ahead & (first < last) & (gap < 0)
-            below, below_squared = torch.where(ahead, node, below), torch.where(ahead, node_squared, below_squared)
-        return blocked
+        return Ascent(a, b, c, level, rise, own, end, end_squared, *span)
 
     def _march(self, origin: Tensor, direction: Tensor) -> Tensor:
         """First crossing (ray,) from outside to inside, by `steps` trials and then by bisection."""

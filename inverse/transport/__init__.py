@@ -10,9 +10,11 @@ from inverse.transport.radiometry import (
 )
 from inverse.transport.radiosity import why_no_interreflection
 from inverse.transport.rendering import Contraction, images_of, radiance_of, render
+from inverse.transport.shadows import Shadows
 
 __all__ = [
     "Contraction",
+    "Shadows",
     "exitance",
     "images_of",
     "irradiance",

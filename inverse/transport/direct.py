@@ -6,17 +6,18 @@ from collections.abc import Iterator, Sequence
 from torch import Tensor
 
 from inverse.scene import Arrival, Light, as_channels
-from inverse.shapes import Solid
-from inverse.transport.shadows import unshadowed
+from inverse.shapes import Solid, dots
+from inverse.transport.shadows import Shadows
 
 
-def unhidden(light: Light, points: Tensor, normals: Tensor, solid: Solid | None) -> Iterator[Arrival]:
-    """The directions from which a light reaches points (point, 3), with no irradiance where the solid hides it."""
-    for arrival in light.arrivals(points):
-        if solid is None or light.why_shadowless(solid) is not None:
+def unhidden(light: Light, shadows: Shadows) -> Iterator[Arrival]:
+    """The directions from which a light reaches the points, with no irradiance where the solid hides it."""
+    shadowless = shadows.solid is None or light.why_shadowless(shadows.solid) is not None
+    for arrival in light.arrivals(shadows.points):
+        if shadowless:
             yield arrival
             continue
-        clear = unshadowed(solid, points, normals, arrival.direction, light.distance(points))
+        clear = shadows.clear(arrival.direction, light.distance(shadows.points))
         yield arrival._replace(irradiance=arrival.irradiance * clear[:, None])
 
 
@@ -27,12 +28,12 @@ def direct_irradiance(
 
     `sky` is the share (point,) of uniform light that nothing hides; all of it if None.
     """
-    total = normals.new_zeros(len(normals), 1)
+    total, shadows = normals.new_zeros(len(normals), 1), Shadows(solid, points, normals)
     for light in lights:
         if light.uniform is not None:
             uniform = math.pi * as_channels(light.uniform, normals)
             total = total + (uniform if sky is None else uniform * sky[:, None])
-        for arrival in unhidden(light, points, normals, solid):
-            cosine = (normals * arrival.direction).sum(-1, keepdim=True).clamp(min=0)
+        for arrival in unhidden(light, shadows):
+            cosine = dots(normals, arrival.direction)[:, None].clamp(min=0)
             total = total + cosine * arrival.irradiance
     return total

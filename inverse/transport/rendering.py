@@ -8,7 +8,7 @@ from numpy.polynomial.legendre import leggauss
 from torch import Tensor
 
 from inverse.scene import Arrival, Footprints, Light, Scene, as_channels
-from inverse.transport.direct import unhidden
+from inverse.transport.common_geometry import CommonGeometry
 from inverse.transport.exchange import passed_on, white_sky_albedo
 from inverse.transport.radiosity import bounced, sky_share
 from torchbrdf import BRDF, Cosines, LinearBRDF, is_per_texel
@@ -66,7 +66,8 @@ def images_of(
 def _reflection(
     footprints: Footprints, light_sets: Sequence[Sequence[Light]], record: Values
 ) -> Callable[[BRDF], Tensor]:
-    sets = [[reflected(footprints, light) for light in lights] for lights in light_sets]
+    geometry = CommonGeometry(footprints)
+    sets = [[reflected(footprints, geometry, light) for light in lights] for lights in light_sets]
 
     def images(model: BRDF) -> Tensor:
         sums = [sum((part(model) for part in parts[1:]), parts[0](model)) for parts in sets]
@@ -82,9 +83,9 @@ def _contraction(
     linear: LinearBRDF,
     texels: Tensor | None,
 ) -> "Contraction":
-    recorded = []
+    geometry, recorded = CommonGeometry(footprints), []
     for lights in light_sets:
-        images = lit_basis(footprints, linear, lights)
+        images = lit_basis(geometry, linear, lights)
         recorded.append(record(images.flatten(1)).unflatten(-1, images.shape[1:]))
     return Contraction(torch.stack(torch.broadcast_tensors(*recorded)), texels)
 
@@ -121,71 +122,68 @@ def _exchanged(model: BRDF, bounces: Sequence[Tensor]) -> Tensor:
     return torch.stack(torch.broadcast_tensors(*(passed_on(rho, images) for images in bounces)))
 
 
-def cosines_to(arrival: Arrival, footprints: Footprints) -> Cosines:
-    """Cosines (point,) of light that arrives at the points."""
-    return Cosines.of(footprints.normals, arrival.direction, footprints.view, normalize=True)
+def _lit(geometry: CommonGeometry, arrival: Arrival) -> tuple[Cosines, Tensor]:
+    """Cosines (..., point), and cos(light) irradiance (..., point, 1 or channel).
+
+    The only place where a camera's image takes the light's cosine.
+    """
+    cosines = geometry.cosines(arrival.direction)
+    return cosines, cosines.light[..., None] * arrival.irradiance
 
 
-def received(cosines: Cosines, arrival: Arrival) -> Tensor:
-    """cos(light) irradiance (point, 1 or channel): the only place where a camera's image takes the light's cosine."""
-    return cosines.light[:, None] * arrival.irradiance
-
-
-def reflected(footprints: Footprints, light: Light) -> Callable[[BRDF], Tensor]:
+def reflected(footprints: Footprints, geometry: CommonGeometry, light: Light) -> Callable[[BRDF], Tensor]:
     """Function from a model to the radiance (point, channel) that it reflects of one light.
 
     The geometry of a light with one direction is done once; of more there would be too much to keep.
     """
-    place = footprints.points, footprints.normals, footprints.solid
     sky = None
     if light.uniform is not None and footprints.partner is not None:
         sky = sky_share(footprints.partner, footprints.points, footprints.normals)[:, None]
-    kept = [] if light.extended else [(cosines_to(k, footprints), k) for k in unhidden(light, *place)]
+    kept = [] if light.extended else [_lit(geometry, arrival) for arrival in geometry.arrivals(light)]
 
     def radiance(model: BRDF) -> Tensor:
-        total = footprints.normals.new_zeros(len(footprints.normals), 1)
+        total = geometry.normals.new_zeros(len(geometry.normals), 1)
         if light.uniform is not None:
-            uniform = _uniform_reflected(model, footprints, light.uniform)
+            uniform = _uniform_reflected(model, geometry, light.uniform)
             total = total + (uniform if sky is None else uniform * sky)
-        for cosines, arrival in kept:
-            total = total + model.evaluate(cosines) * received(cosines, arrival)
+        for cosines, strength in kept:
+            total = total + model.evaluate(cosines) * strength
         if light.extended:
-            for arrival in unhidden(light, *place):
-                cosines = cosines_to(arrival, footprints)
-                total = total + model.evaluate(cosines) * received(cosines, arrival)
-            total = total + _mirrored(model, footprints, light)
+            for arrivals in geometry.batches(light):
+                cosines, strength = _lit(geometry, arrivals)
+                total = total + (model.evaluate(cosines) * strength).sum(0)
+            total = total + _mirrored(model, geometry, light)
         return total
 
     return radiance
 
 
-def lit_basis(footprints: Footprints, model: LinearBRDF, lights: Sequence[Light]) -> Tensor:
+def lit_basis(geometry: CommonGeometry, model: LinearBRDF, lights: Sequence[Light]) -> Tensor:
     """A linear model's geometry images times cosine and irradiance (point, 1 or channel, K), of lights without a
     uniform part."""
-    total = footprints.normals.new_zeros(len(footprints.normals), 1, 1)
+    total = geometry.normals.new_zeros(len(geometry.normals), 1, 1)
     for light in lights:
-        for arrival in unhidden(light, footprints.points, footprints.normals, footprints.solid):
-            cosines = cosines_to(arrival, footprints)
-            total = total + received(cosines, arrival)[..., None] * model.basis(cosines)[:, None, :]
+        for arrival in geometry.arrivals(light):
+            cosines, strength = _lit(geometry, arrival)
+            total = total + strength[..., None] * model.basis(cosines)[:, None, :]
     return total
 
 
-def _mirrored(model: BRDF, footprints: Footprints, light: Light) -> Tensor:
+def _mirrored(model: BRDF, geometry: CommonGeometry, light: Light) -> Tensor:
     """What a mirror lobe, which f_r cannot show, sends of an extended light: its radiance in the mirror direction."""
-    normals, view = footprints.normals, footprints.view
-    image = 2 * (normals * view).sum(-1, keepdim=True) * normals - view
-    mirror = model.delta_reflectance(Cosines.of(normals, image, view, normalize=True))
-    return torch.zeros_like(normals[:, :1]) if mirror is None else mirror * light.seen(image)
+    image = 2 * geometry.cos_view[:, None] * geometry.normals - geometry.view
+    mirror = model.delta_reflectance(geometry.cosines(image))
+    return torch.zeros_like(geometry.normals[:, :1]) if mirror is None else mirror * light.seen(image)
 
 
-def _uniform_reflected(model: BRDF, footprints: Footprints, uniform: Tensor | float) -> Tensor:
+def _uniform_reflected(model: BRDF, geometry: CommonGeometry, uniform: Tensor | float) -> Tensor:
     """Radiance (point, channel) under uniform light: the directional albedo times its radiance.
 
     The albedo is smooth in the view cosine, so it is computed at a few and interpolated by the
     polynomial through them (3e-4 for the Oren-Nayar models up to 85 degrees). A per-texel material has
     an albedo of its own at each point, which is integrated there, with fewer nodes.
     """
-    cos_view = (footprints.normals * footprints.view).sum(-1).clamp(0, 1)
+    cos_view = geometry.cos_view.clamp(0, 1)
     strength = as_channels(uniform, cos_view)
     if is_per_texel(model):
         return model.directional_albedo(cos_view, nodes=_TEXEL_NODES) * strength

@@ -1,5 +1,6 @@
 """Directions: what is refused and how, and what the cosines derive."""
 
+import copy
 import math
 
 import pytest
@@ -204,3 +205,61 @@ def test_normalize_takes_any_finite_length():
     for length in (1e-30, 1e30):
         found = Cosines.of(n, torch.tensor([0.6 * length, 0.0, 0.8 * length]), n, normalize=True)
         torch.testing.assert_close(found.light.item(), 0.8, rtol=1e-6, atol=0)
+
+
+class TestOfComponents:
+    """The same cosines from x, y and z that lie apart: equal values and derivatives, the same refusals."""
+
+    def directions(self, dtype, count=200):
+        g = torch.Generator().manual_seed(7)
+        vectors = (torch.randn(count, 3, generator=g, dtype=torch.float64) for _ in range(3))
+        return [torch.nn.functional.normalize(v, dim=-1).to(dtype) for v in vectors]
+
+    @pytest.mark.parametrize("brdf", [OrenNayar(sigma=0.5), GGX(alpha=0.4)], ids=["Oren-Nayar", "GGX"])
+    def test_values_and_derivatives_of_any_frame(self, brdf, dtype):
+        # random normals: a third of the triples is above the horizon
+        brdf, vectors = copy.deepcopy(brdf).to(dtype), self.directions(dtype)
+        apart = [[part.clone().requires_grad_() for part in v.unbind(-1)] for v in vectors]
+        whole = [v.clone().requires_grad_() for v in vectors]
+        got, expected = brdf.evaluate(Cosines.of_components(*apart)), brdf(*whole)
+        assert (expected > 0).sum() > 20
+        eps = torch.finfo(dtype).eps
+        # strided memory is summed in another order: a rounding of each product, relative to the smallest
+        cosines = Cosines.of(*vectors)
+        smallest = float(torch.minimum(cosines.light, cosines.view).min())
+        torch.testing.assert_close(got, expected, rtol=4 * eps / smallest, atol=0)
+        by_part = torch.autograd.grad(got.sum(), [part for v in apart for part in v])
+        by_whole = torch.autograd.grad(expected.sum(), whole)
+        for v, g in enumerate(by_whole):
+            torch.testing.assert_close(torch.stack(by_part[3 * v : 3 * v + 3], -1), g, rtol=1e3 * eps, atol=1e2 * eps)
+
+    def test_components_broadcast(self):
+        zero, one = torch.zeros(()).double(), torch.ones(()).double()
+        x = torch.linspace(0, 0.9, 4).double()
+        z = (1 - x * x).sqrt()
+        cosines = Cosines.of_components((zero, zero, one), (x, zero, z), (x[:, None], zero, z[:, None]))
+        assert cosines.phase.shape == (4, 4)
+        torch.testing.assert_close(cosines.phase, x * x[:, None] + z * z[:, None])
+
+    def test_nothing_at_all(self):
+        none = (torch.zeros(0),) * 3
+        assert Cosines.of_components(none, none, none).light.shape == (0,)
+
+    @pytest.mark.parametrize("name", NAMES)
+    @pytest.mark.parametrize(
+        ("change", "error", "match"),
+        [
+            (lambda parts: parts[:2], ValueError, "must have three components x, y, z"),
+            (lambda parts: [2 * part for part in parts], ValueError, "must hold finite unit vectors; 200 of 200"),
+            (lambda parts: [part[:3] if k else part for k, part in enumerate(parts)], ValueError, "that broadcast"),
+            (lambda parts: [0.0, 0.0, 1.0], TypeError, "must be three tensors"),
+            (lambda parts: [part.float() for part in parts], TypeError, "must share one dtype"),
+            (lambda parts: [part.half() for part in parts], TypeError, "must be float32 or float64"),
+        ],
+        ids=["two", "long", "shapes", "numbers", "mixed", "half"],
+    )
+    def test_refuses_what_vectors_are_refused_for(self, name, change, error, match):
+        given = dict(zip(NAMES, (v.unbind(-1) for v in self.directions(torch.float64)), strict=True))
+        with pytest.raises(error, match=match) as caught:
+            Cosines.of_components(**given | {name: change(given[name])})
+        assert name in str(caught.value)

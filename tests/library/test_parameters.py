@@ -5,13 +5,18 @@ import math
 import pytest
 import torch
 from torch import nn
+from torch.nn.functional import normalize
 from torch.testing import assert_close
 
 from torchbrdf import (
+    GGX,
+    Conductor,
+    HeTorrance,
     Interval,
     Lambert,
     OrenNayar,
     QualitativeOrenNayar,
+    TorranceSparrow,
     fixed,
     sigma_from_beckmann_alpha,
     sigma_from_degrees,
@@ -190,3 +195,39 @@ def test_converters_keep_dtype(convert, dtype):
 def test_half_precision_parameters_are_refused():
     with pytest.raises(TypeError, match=r"OrenNayar.albedo must be float32 or float64; found torch.float16"):
         OrenNayar(albedo=torch.tensor(0.5, dtype=torch.float16))
+
+
+def test_a_domain_may_end_before_its_coordinate_does():
+    """What a formula cannot compute is refused; trained values keep the coordinate they had."""
+    domain = Interval(0.0, 2.0, "rad", least=0.1)
+    domain.check("x", torch.tensor(0.1), open_ends=True)
+    with pytest.raises(ValueError, match=r"x must lie in \[0\.1, 2\] rad; 1 of 1"):
+        domain.check("x", torch.tensor(0.0999))
+    assert torch.equal(domain.to_raw(torch.tensor(0.5)), Interval(0.0, 2.0).to_raw(torch.tensor(0.5)))
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize(
+    ("make", "ends", "beyond"),
+    [
+        (lambda x: TorranceSparrow(sigma=fixed(x)), [1e-3, math.pi / 2], [0.0, 1e-4]),
+        (lambda x: GGX(alpha=0.3, fresnel=Conductor(eta=fixed(x), k=fixed(0.0))), [0.01, 1e3], [0.0, 1e-4]),
+        (lambda x: GGX(alpha=0.3, fresnel=Conductor(eta=fixed(x), k=fixed(3.0))), [0.01, 1e3], [0.0]),
+        (lambda x: HeTorrance(sigma0=0.1, tau=1.0, wavelength=0.5, eta=fixed(x)), [0.01, 1e3], [0.0]),
+        (lambda x: HeTorrance(sigma0=0.1, tau=fixed(1.0), wavelength=fixed(x)), [1.0000001e-9, 1e3], [1e-12, 1e-15]),
+    ],
+    ids=["facets", "transparent", "metal", "waves: index", "waves: length"],
+)
+@pytest.mark.filterwarnings("ignore:HeTorrance")
+def test_the_ends_of_domains_are_computed_and_what_is_beyond_refused(make, ends, beyond, dtype):
+    generator = torch.Generator().manual_seed(4)
+    up = torch.tensor([0.0, 0.0, 1.0], dtype=dtype)
+    light, view = (normalize(torch.randn(500, 3, generator=generator, dtype=dtype), dim=-1) for _ in range(2))
+    light[0] = view[0] = up
+    view[1] = light[1] * torch.tensor([-1.0, -1.0, 1.0], dtype=dtype)  # the mirror
+    for value in ends:
+        model = make(torch.tensor(value, dtype=dtype)).to(dtype)
+        assert model(up.expand(500, 3), light, view).isfinite().all(), value
+    for value in beyond:
+        with pytest.raises(ValueError, match=r"must (lie in|be at most)"):
+            make(torch.tensor(value, dtype=dtype))

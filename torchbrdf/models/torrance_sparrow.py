@@ -18,7 +18,7 @@ from torchbrdf.facets import (
     visible_azimuth,
 )
 from torchbrdf.fresnel import Fresnel, Perfect
-from torchbrdf.parameters import ROUGHNESS, Constrained, ParameterValue, kept
+from torchbrdf.parameters import FACET_ROUGHNESS, Constrained, ParameterValue, kept
 from torchbrdf.sampling import along_view, mirrored
 
 
@@ -36,7 +36,7 @@ def torrance_sparrow(
 
     Args:
         cosines: of light, view and phase angle, each (...).
-        sigma: roughness, scalar or (...). [rad] in (0, pi/2]
+        sigma: roughness, scalar or (...). [rad] in [0.001, pi/2]: narrower lobes are a `Mirror`
         fresnel: F at the half vector (..., channel). [-]
         normalised: False leaves out c/4, as Oren & Nayar 1994, eq. (31), for k_s values of that paper: k_s is then in
             1/sr.
@@ -49,7 +49,7 @@ def torrance_sparrow(
         10.1145/192161.192213, long version (1995, DOI 10.1007/BF01679684), eqs. (31)-(33), (38), with Min for the
         misprinted Max.
     """
-    ROUGHNESS.check("torrance_sparrow: sigma", sigma)
+    FACET_ROUGHNESS.check("torrance_sparrow: sigma", sigma)
     half = HalfVector.of(cosines)
     return cosines.zero_below_horizon(_lobe(cosines, half, sigma, normalised)[..., None] * fresnel)
 
@@ -76,7 +76,7 @@ class TorranceSparrow(BRDF):
     The body and surface mixture of Oren & Nayar 1994, eq. (32), is `k_b * OrenNayar(...) + k_s * TorranceSparrow(...)`.
     """
 
-    sigma: Constrained = Constrained(ROUGHNESS)
+    sigma: Constrained = Constrained(FACET_ROUGHNESS)
 
     def __init__(self, *, sigma: ParameterValue = 0.3, fresnel: Fresnel | None = None, normalised: bool = True):
         super().__init__()

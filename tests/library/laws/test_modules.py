@@ -142,7 +142,9 @@ def test_others_compile(backend):
 
 
 IN_ONE_GRAPH_OF_ANY_SHAPE = ("lambert", "hapke")  # a bounded and an unbounded domain; the others by hand
-IN_SEVERAL = pytest.mark.xfail(strict=True, reason="the modes of all bounces are looked up by numbers")
+# Of the surface the modes are constants whose sizes torch takes for unknown; of the grooves they are looked up by the
+# number that the slope is.
+IN_SEVERAL = pytest.mark.xfail(strict=True, reason="the modes of all bounces are found by numbers of Python")
 
 
 def marks(model):

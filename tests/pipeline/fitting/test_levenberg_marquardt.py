@@ -57,6 +57,26 @@ def test_a_start_far_too_bright_does_not_stop_early(exposure):
     assert abs(found.parameters["sigma"].item() - 0.5) < 4 * found.standard_error["sigma"].item()
 
 
+def test_normal_equations_of_a_model_that_may_write_into_its_tensors():
+    shared, own = torch.tensor([0.3, -0.7], dtype=D), torch.linspace(-1, 1, 5, dtype=D)[:, None]
+
+    def plain(shared, own):
+        return torch.stack((shared[0].exp() * own, shared.prod() - own**2))
+
+    def written(shared, own):
+        values = torch.zeros(2, 5, 1, dtype=D)
+        return values.add_(plain(shared, own))
+
+    one, other = (NormalEquations.of(Residuals(k), shared, own) for k in (plain, written))
+    a, b, y = shared[0].exp(), shared.flip(0), own
+    by_shared = torch.stack((torch.stack((a * y, b[0] + 0 * y)), torch.stack((0 * y, b[1] + 0 * y))))
+    by_own = torch.stack((a + 0 * y, -2 * y))
+    for equations in (one, other):
+        torch.testing.assert_close(equations.shared, torch.einsum("ginc,hinc->gh", by_shared, by_shared))
+        torch.testing.assert_close(equations.own[:, 0], by_own.square().sum((0, 2))[:, None])
+        torch.testing.assert_close(equations.mixed[..., 0], torch.einsum("ginc,inc->ng", by_shared, by_own))
+
+
 # Without photographs: problems whose minimum is known
 
 

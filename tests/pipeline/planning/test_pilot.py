@@ -5,7 +5,7 @@ import torch
 
 from inverse import Distant, Scene, sphere, vase
 from inverse.planning.pilot import stratified_sample
-from inverse.transport.shadows import unshadowed
+from inverse.transport.shadows import Shadows
 
 D = torch.float64
 RAISED = Distant(torch.tensor([0.3, 1.6, 0.6], dtype=D))
@@ -18,7 +18,7 @@ def test_counts_of_the_sample_are_those_of_the_image():
     surface = vase(60, 60, dtype=D)
     scene = Scene(surface, [RAISED])
     points, normals = surface.points[surface.mask], surface.normals[surface.mask]
-    clear = unshadowed(surface.solid, points, normals, RAISED.direction)
+    clear = Shadows(surface.solid, points, normals).clear(RAISED.direction)
     steep = torch.rad2deg(torch.acos(normals[:, 2])) >= 45
     kinds = {"right": normals[:, 0] > 0, "up": normals[:, 1] > 0, "in shadow": ~clear, "steep": steep}
     _, pixels, stands_for = stratified_sample(scene, ENOUGH, 0, extremes=False)

@@ -6,7 +6,7 @@ import torch
 
 from inverse import Distant, Scene, plane, sphere, vase
 from inverse.planning.sampling_detail import borders, sampling_options
-from inverse.transport.shadows import unshadowed
+from inverse.transport.shadows import Shadows
 from torchbrdf import Lambert
 
 RAISED = Distant(torch.tensor([0.3, 1.6, 0.6]))
@@ -37,7 +37,8 @@ def test_the_edge_of_a_cast_shadow_is_never_merged():
     scene = Scene(surface, [RAISED])
     lit = torch.zeros_like(surface.mask)
     points, normals = surface.points[surface.mask], surface.normals[surface.mask]
-    lit[surface.mask] = unshadowed(surface.solid, points, normals, RAISED.direction) & (normals @ RAISED.direction > 0)
+    clear = Shadows(surface.solid, points, normals).clear(RAISED.direction)
+    lit[surface.mask] = clear & (normals @ RAISED.direction > 0)
     blocks = lit.unflatten(0, (40, 4)).unflatten(2, (40, 4)).sum((1, 3))
     crossed = (surface.coverage() == 1) & (blocks > 0) & (blocks < 16)
     assert crossed.sum() > 10

@@ -53,6 +53,15 @@ def test_first_steps(run):
         assert numbers(line)[0] == pytest.approx(40, abs=0.02)
 
 
+@pytest.mark.parametrize("backend", ["aot_eager", pytest.param("inductor", marks=pytest.mark.slow)])
+def test_compiled_fit_finds_most_pixels(run, backend):
+    torch.compiler.reset()
+    printed = run("06_compiled_fit.py", "--pixels", 500, "--steps", 200, "--backend", backend).splitlines()
+    sigma, albedo = numbers(printed[-1])
+    assert sigma < 0.02
+    assert albedo < 0.01
+
+
 def test_vase_fit_recovers_the_clay_and_lambert_fails_as_the_paper_says(run, tmp_path):
     printed = run("01_fit_vase.py", "--size", 96, "--output", tmp_path).splitlines()
     exact = next(x for x in printed if x.startswith("exact, K = 16, all"))
@@ -106,6 +115,18 @@ def test_models_are_timed_against_the_code_by_hand(run):
     rows = dict(line.strip("| ").split(" | ", 1) for line in printed.splitlines() if " x | " in line)
     assert rows["by hand"].startswith("1.00 x | 1.00 x")
     assert {"OrenNayar", "EON", "FastGaussianHeightfield"} <= rows.keys()
+
+
+def test_pictures_and_their_shadows_are_timed(run):
+    printed = run("benchmarks/pictures.py", "--size", 24, "--repeats", 1)
+    rows = [line.strip("| ").split(" | ") for line in printed.splitlines() if line[-3:-2].isdigit()]
+    assert [row[0] for row in rows] == [
+        "vase",
+        "two spheres on a plane",
+        "vase's depth map",
+        *["vase", "vase", "sphere", "sphere"],
+    ]
+    assert all(float(number) > 0 for row in rows for number in row[1:])
 
 
 def test_the_code_by_hand_is_the_functional_model(load):

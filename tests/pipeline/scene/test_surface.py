@@ -229,3 +229,8 @@ def test_orthographic_group_shows_the_nearer_solid():
     assert surface.points[20, 20, 2].item() == pytest.approx(0.5, abs=1e-3)
     assert surface.points[0, 0, 2].item() == pytest.approx(-0.5)
     assert surface.normals[0, 0].tolist() == [0, 0, 1]
+
+
+def test_vases_of_every_size_are_one_solid():
+    one, other = (vase(8, width, samples=k) for width, k in ((8, 1), (12, 2)))
+    assert one.solid is other.solid

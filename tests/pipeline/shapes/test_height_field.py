@@ -8,7 +8,7 @@ from helpers.surfaces import masked, towards
 
 from inverse.scene.maps import from_depth
 from inverse.shapes.height_field import HeightField
-from inverse.transport.shadows import unshadowed
+from inverse.transport.shadows import Shadows
 
 D = torch.float64
 
@@ -32,7 +32,7 @@ def test_shadow_of_a_dome_in_a_depth_map(dtype):
     beside = (to_centre - (to_centre @ direction)[:, None] * direction).norm(dim=-1)
     ground = to_centre[:, :2].norm(dim=-1) > radius + 2
     sure = ground & ((beside - radius).abs() > 1)
-    clear = unshadowed(surface.solid, points, normals, direction.to(dtype))
+    clear = Shadows(surface.solid, points, normals).clear(direction.to(dtype))
     assert torch.equal(~clear[sure], (beside < radius)[sure] & (to_centre @ direction > 0)[sure])
     assert (~clear[sure]).sum() > 300
     top = to_centre[:, :2].norm(dim=-1) < 0.8 * radius
@@ -53,7 +53,7 @@ def test_bowl_in_closed_form(angles, dtype):
     end = own + (rate / (k * direction[:2].square().sum()))[:, None] * direction[:2]
     border = end.abs().amax(-1)
     sure = ((border - 60).abs() > 0.5) & (rate.abs() > 0.02)
-    clear = unshadowed(surface.solid, points, normals, direction.to(dtype))
+    clear = Shadows(surface.solid, points, normals).clear(direction.to(dtype))
     assert torch.equal(~clear[sure], ((rate > 0) & (border < 60))[sure])
     assert sure.double().mean() > 0.9
     assert (~clear).sum() > 500
@@ -76,8 +76,30 @@ def test_unknown_parts_of_a_depth_map_hide_nothing():
     heights = torch.zeros(31, 61, dtype=D)
     heights[:, 28:33] = 20.0
     at, up = torch.tensor([[15.0, -15.0, 0.0]], dtype=D), torch.tensor([[0.0, 0, 1]], dtype=D)
-    assert not unshadowed(HeightField(heights), at, up, towards(60, 0)).any()
+    assert not Shadows(HeightField(heights), at, up).clear(towards(60, 0)).any()
     heights[:, 28:33] = torch.nan
-    assert unshadowed(HeightField(heights), at, up, towards(60, 0)).all()
+    assert Shadows(HeightField(heights), at, up).clear(towards(60, 0)).all()
     with pytest.raises(ValueError, match=r"HeightField.heights must be \(rows, columns\)"):
         HeightField(torch.full((3, 3), torch.nan))
+
+
+@pytest.mark.parametrize("size", [(70, 150), (9, 90)])
+@pytest.mark.parametrize("distance", [math.inf, 30.0])
+def test_shadows_are_those_of_rays_that_try_every_pixel(size, distance):
+    for seed in range(2):
+        g = torch.Generator().manual_seed(seed)
+        heights = torch.randn(size, dtype=D, generator=g).cumsum(1)
+        if seed % 2:
+            heights[torch.rand(size, generator=g) < 0.05] = torch.nan
+        at = torch.rand(200, 3, dtype=D, generator=g) * torch.tensor([size[1] - 1.0, 1.0 - size[0], 0], dtype=D)
+        origin = (
+            at + torch.tensor([0.0, 0, 1], dtype=D) * heights[-at[:, 1].round().long(), at[:, 0].round().long(), None]
+        )
+        origin = origin[origin.isfinite().all(-1)]
+        direction = torch.nn.functional.normalize(torch.randn(origin.shape, dtype=D, generator=g), dim=-1)
+        reach = torch.rand(len(origin), dtype=D, generator=g) * distance
+        relief = HeightField(heights)
+        blocked = relief.blocks(origin, direction, reach)
+        assert torch.equal(blocked, relief.hit(origin, direction) < reach)
+        assert blocked.any()
+        assert not blocked.all()

@@ -7,7 +7,7 @@ from helpers.rays import rays
 from helpers.surfaces import towards
 
 from inverse import Revolution
-from inverse.transport.shadows import unshadowed
+from inverse.transport.shadows import Shadows
 
 D = torch.float64
 # an ellipsoid of half axes 0.4, 0.8, 0.4: a profile whose hits have a closed form
@@ -58,7 +58,7 @@ def test_concave_solid_of_revolution_in_closed_form(elevation, dtype):
     height = points[:, 1] + again * direction[1]
     expected = (first > 0) & (again > 0) & (height.abs() < high)
     sure = ((height.abs() - high).abs() > 2e-3) & (first.abs() > 1e-3)
-    clear = unshadowed(solid, points.to(dtype), normals.to(dtype), direction.to(dtype))
+    clear = Shadows(solid, points.to(dtype), normals.to(dtype)).clear(direction.to(dtype))
     assert torch.equal(~clear[sure], expected[sure])
     assert sure.double().mean() > 0.95
     if abs(elevation) > 45:  # steeper than the cone b y^2 that it approaches

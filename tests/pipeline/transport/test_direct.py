@@ -5,7 +5,7 @@ import torch
 from inverse import Distant, Group, Plane, Scene, Sphere, from_depth, render, vase
 from inverse.shapes.form_factors import PairExchange
 from inverse.transport.direct import direct_irradiance
-from inverse.transport.shadows import unshadowed
+from inverse.transport.shadows import Shadows
 from torchbrdf import Lambert
 
 D = torch.float64
@@ -23,7 +23,7 @@ def test_a_shadow_takes_the_light_and_nothing_else():
     lit, plain = (render(Scene(surface, [RAISED], shadows=k), model)[0, ..., 0] for k in (True, False))
     assert surface.solid is not None
     points, normals = surface.points[surface.mask], surface.normals[surface.mask]
-    clear = unshadowed(surface.solid, points, normals, RAISED.direction)
+    clear = Shadows(surface.solid, points, normals).clear(RAISED.direction)
     assert 20 < int((~clear).sum()) < len(clear) / 2
     assert torch.equal(lit[surface.mask], plain[surface.mask] * clear)
 

@@ -8,7 +8,7 @@ import torch
 from inverse import Ambient, Distant, Scene, render, vase
 from inverse.transport.exchange import passed_on, white_sky_albedo
 from inverse.transport.radiosity import bounced, sky_share
-from inverse.transport.shadows import unshadowed
+from inverse.transport.shadows import Shadows
 from torchbrdf import Lambert, OrenNayar
 
 D = torch.float64
@@ -27,7 +27,7 @@ def test_light_between_parts_adds_its_bounces():
     found = render(Scene(surface, [lights], between_parts=True), model)[0][surface.mask]
     solid, points, normals = surface.solid, surface.points[surface.mask], surface.normals[surface.mask]
     assert solid is not None
-    cosine = (normals @ RAISED.direction).clamp(min=0) * unshadowed(solid, points, normals, RAISED.direction)
+    cosine = (normals @ RAISED.direction).clamp(min=0) * Shadows(solid, points, normals).clear(RAISED.direction)
     sky = sky_share(solid, points, normals)
     received = cosine[:, None] + math.pi * sky[:, None] * number([0.1, 0.3])
     rho = model.albedo

@@ -69,4 +69,4 @@ def test_exitance_is_albedo_times_irradiance():
     face = plane(1, 1, normal=(0.6, 0, 0.8), dtype=D)
     light = (Distant(vector(0, 0, 1)),)
     wanted = model.directional_albedo(number(0.8), nodes=48) * 0.8
-    torch.testing.assert_close(exitance(model, face, light, nodes=48)[0], wanted, rtol=1e-4, atol=0)
+    torch.testing.assert_close(exitance(model, face, light, nodes=12)[0], wanted, rtol=1e-4, atol=0)

@@ -10,7 +10,7 @@ from inverse import Ambient, Disc, Distant, Environment, Point, Scene, plane, re
 from inverse.scene.footprints import Footprints
 from inverse.scene.maps import from_depth
 from inverse.scene.surface import cylinder
-from inverse.transport.rendering import cosines_to, radiance_of
+from inverse.transport.rendering import radiance_of
 from torchbrdf import Coupled, Lambert, Mirror, OrenNayar, QualitativeOrenNayar, Schlick
 
 D = torch.float64
@@ -231,14 +231,6 @@ class _Render(torch.nn.Module):
 
     def forward(self):
         return render(self.scene, self.model)
-
-
-def test_cosines_come_from_the_masked_points():
-    surface = sphere(9, 9, dtype=D)
-    cosines = cosines_to(next(Distant.from_angle(0).arrivals(surface.points[surface.mask])), Footprints.of(surface))
-    torch.testing.assert_close(cosines.light, surface.normals[surface.mask][:, 2])
-    torch.testing.assert_close(cosines.view, cosines.light)
-    torch.testing.assert_close(cosines.phase, torch.ones_like(cosines.light))
 
 
 def test_per_texel_albedo_under_ambient_light():

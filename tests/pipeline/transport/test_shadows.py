@@ -9,7 +9,7 @@ from helpers.surfaces import masked, towards
 
 from inverse import Distant, Group, Plane, Point, Revolution, Sphere, cuboid, cylinder, sphere, vase
 from inverse.scene.surface import vase_profile
-from inverse.transport.shadows import unshadowed
+from inverse.transport.shadows import Shadows
 
 D = torch.float64
 
@@ -30,7 +30,7 @@ def marched(points, normals, direction, steps=1500):
 def test_vase_in_raised_light_as_marched(azimuth, elevation):
     solid, (points, normals) = vase(8, 8).solid, masked(vase(96, 96, dtype=D))
     direction = towards(azimuth, elevation)
-    shadow, expected = ~unshadowed(solid, points, normals, direction), marched(points, normals, direction)
+    shadow, expected = ~Shadows(solid, points, normals).clear(direction), marched(points, normals, direction)
     assert expected.sum() > 20
     # the marching misses dips shorter than its steps: a few points at the shadow's edge
     assert (shadow & ~expected).sum() <= 0.002 * len(points)
@@ -41,7 +41,7 @@ def test_vase_in_raised_light_as_marched(azimuth, elevation):
 def test_level_light_casts_no_shadow_on_the_vase(azimuth):
     solid, (points, normals) = vase(8, 8).solid, masked(vase(64, 64, dtype=D))
     assert not marched(points, normals, towards(azimuth, 0)).any()
-    assert unshadowed(solid, points, normals, towards(azimuth, 0)).all()
+    assert Shadows(solid, points, normals).clear(towards(azimuth, 0)).all()
 
 
 def test_both_precisions_agree():
@@ -49,7 +49,7 @@ def test_both_precisions_agree():
     solid = vase(8, 8).solid
     for angles in [(20, 60), (-70, 50), (0, -60)]:
         direction = towards(*angles)
-        assert torch.equal(unshadowed(solid, *one, direction.float()), unshadowed(solid, *other, direction))
+        assert torch.equal(Shadows(solid, *one).clear(direction.float()), Shadows(solid, *other).clear(direction))
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, D])
@@ -58,11 +58,11 @@ def test_no_speckles_on_convex_shapes(dtype):
     for surface in (sphere(64, 64, dtype=dtype), cylinder(64, 64, dtype=dtype), cuboid(64, 64, pitch=20, dtype=dtype)):
         points, normals = masked(surface)
         for angles in [(0, 0), (80, 5), (100, 40), (30, 89), (-60, -30)]:
-            assert unshadowed(surface.solid, points, normals, towards(*angles).to(dtype)).all()
+            assert Shadows(surface.solid, points, normals).clear(towards(*angles).to(dtype)).all()
     points = long.patches(1600).points
     normals = long.normal(points).to(dtype)
     for angles in [(0, 0), (80, 5), (100, 40), (30, 89), (-60, -30)]:
-        assert unshadowed(long, points.to(dtype), normals, towards(*angles).to(dtype)).all()
+        assert Shadows(long, points.to(dtype), normals).clear(towards(*angles).to(dtype)).all()
 
 
 RADIUS, ABOVE = 0.25, 0.4
@@ -84,7 +84,7 @@ def test_shadow_of_a_sphere_on_a_plane_is_an_ellipse():
     along, across = offset @ level, offset[:, 0] * level[1] - offset[:, 1] * level[0]
     form = (along * direction[1] / RADIUS) ** 2 + (across / RADIUS) ** 2
     sure = (form - 1).abs() > 1e-3
-    clear = unshadowed(SCENE, points, normals, direction)
+    clear = Shadows(SCENE, points, normals).clear(direction)
     assert torch.equal(clear[sure], form[sure] > 1)
     assert (~clear).sum().item() * (3 / 120) ** 2 == pytest.approx(math.pi * RADIUS**2 / direction[1].item(), rel=0.02)
 
@@ -97,7 +97,7 @@ def test_shadow_of_a_lamp_is_a_cone():
         arrival = next(lamp.arrivals(points))
         cosine = -(arrival.direction @ to_centre) / to_centre.norm()
         edge = math.sqrt(1 - (RADIUS / to_centre.norm().item()) ** 2)
-        clear = unshadowed(SCENE, points, normals, arrival.direction, lamp.distance(points))
+        clear = Shadows(SCENE, points, normals).clear(arrival.direction, lamp.distance(points))
         sure = (cosine - edge).abs() > 1e-5
         assert torch.equal(clear[sure], cosine[sure] < edge)
         assert not clear.all()
@@ -107,6 +107,6 @@ def test_lamp_in_front_of_the_occluder_casts_no_shadow():
     points, normals = floor()
     lamp = Point(torch.tensor([0.02, 0.1, 0.0], dtype=D))  # between the sphere and the floor
     arrival = next(lamp.arrivals(points))
-    assert unshadowed(SCENE, points, normals, arrival.direction, lamp.distance(points)).all()
-    assert not unshadowed(SCENE, points, normals, arrival.direction).all()
+    assert Shadows(SCENE, points, normals).clear(arrival.direction, lamp.distance(points)).all()
+    assert not Shadows(SCENE, points, normals).clear(arrival.direction).all()
     assert Distant.from_angle(0).distance(points) is None

@@ -19,6 +19,7 @@ from torchbrdf.models.he_torrance.reflectance import (
     LENGTH,
     WAVELENGTH,
     check_channels,
+    check_ratio,
     directional_diffuse,
     unchecked_specular_reflectivity,
     uniform_diffuse,
@@ -117,6 +118,7 @@ class HeTorrance(BRDF):
             raise ValueError(
                 "HeTorrance.wave_optics=False needs sigma0 above 0: a surface without height has no facets."
             )
+        check_ratio("HeTorrance", sigma0=self.sigma0, tau=self.tau, wavelength=self.wavelength)
         check_channels("HeTorrance", wavelength=self.wavelength, eta=self.eta, k=self.k, diffuse=self.diffuse)
         self._warn_of_units()
         if not is_per_texel(self):

@@ -5,7 +5,8 @@ import math
 import torch
 from torch import Tensor
 
-from torchbrdf._numerics import safe_sqrt
+from torchbrdf._numerics import holds, safe_sqrt
+from torchbrdf.checks import taken_on_trust
 from torchbrdf.directions import Cosines
 from torchbrdf.fresnel import RELATIVE_INDEX, conductor
 from torchbrdf.models.he_torrance.perfect_reflector import (
@@ -21,6 +22,8 @@ SHORTEST = 1e-15
 HEIGHT = Interval(0.0, math.inf, even=True)
 LENGTH = Interval(SHORTEST, math.inf)
 WAVELENGTH = Interval(SHORTEST, math.inf, trailing=1)
+# Heights and lengths in wavelengths; beyond, their squares and fourth powers overflow in float32.
+MOST_WAVELENGTHS = 1e9
 
 
 def check_surface(name: str, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor, **channels: Tensor) -> None:
@@ -32,6 +35,20 @@ def check_surface(name: str, *, sigma0: Tensor, tau: Tensor, wavelength: Tensor,
         if part in channels:
             domain.check(f"{name}: {part}", channels[part])
     check_channels(name, wavelength=wavelength, **channels)
+    check_ratio(name, sigma0=sigma0, tau=tau, wavelength=wavelength)
+
+
+def check_ratio(name: str, *, wavelength: Tensor, **lengths: Tensor) -> None:
+    """Raise ValueError for a surface that is too large, in wavelengths, for float32. Not inside `unchecked()`."""
+    if taken_on_trust() or not wavelength.numel():
+        return
+    shortest = wavelength.detach().min()
+    for part, length in lengths.items():
+        if length.numel() and not holds(length.detach().max() <= MOST_WAVELENGTHS * shortest):
+            raise ValueError(
+                f"{name}: {part} must be at most {MOST_WAVELENGTHS:.0e} wavelengths; "
+                f"found {length.max():.4g} and a wavelength of {shortest:.4g}: the same unit for both?"
+            )
 
 
 def check_channels(name: str, **channels: Tensor) -> None:
@@ -66,7 +83,7 @@ def he_torrance(
         tau: distance at which the autocorrelation of heights falls to 1/e, scalar or (...). [length] > 0
         wavelength: of each channel, scalar or (channel,). [length] > 0
             sigma0, tau and wavelength share one unit, whichever; only their ratios count.
-        eta, k: real and imaginary part of the index, scalar, (channel,) or (..., channel). [-] >= 0
+        eta, k: real and imaginary part of the index, scalar, (channel,) or (..., channel). [-] >= 0.01, >= 0
         diffuse: a, light reflected by anything but the surface itself, as a hemispherical reflectance; scalar,
             (channel,) or (..., channel). [-] in [0, 1]
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.

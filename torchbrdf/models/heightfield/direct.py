@@ -16,6 +16,7 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
+from torchbrdf._constants import constant
 from torchbrdf._numerics import horizon
 from torchbrdf.models.heightfield.slope_frame import SlopeFrame
 from torchbrdf.models.heightfield.visibility import (
@@ -139,16 +140,12 @@ def _sinh_cosh(u: Tensor) -> tuple[Tensor, Tensor]:
     return 0.5 * (e - 1 / e), 0.5 * (e + 1 / e)
 
 
+@constant
 @lru_cache(maxsize=8)
-def _whole_rule(quadrature: Quadrature) -> float:
+def _whole(quadrature: Quadrature) -> float:
+    """Integral of exp(-x^2/2) over the reach by the rule along x."""
     like = torch.zeros((), dtype=torch.float64)
     node, weight = gauss_legendre(quadrature.along, like)
     end = math.asinh(quadrature.reach)
     x, stretch = _sinh_cosh(2 * end * node - end)
     return float((2 * end * weight * stretch * torch.exp(-0.5 * x * x)).sum())
-
-
-@torch.compiler.assume_constant_result
-def _whole(quadrature: Quadrature) -> float:
-    """Integral of exp(-x^2/2) over the reach by the rule along x."""
-    return _whole_rule(quadrature)

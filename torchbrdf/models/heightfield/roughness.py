@@ -17,6 +17,7 @@ import torch
 from numpy.polynomial import Chebyshev
 from torch import Tensor
 
+from torchbrdf._constants import constant
 from torchbrdf.parameters import ROUGHNESS, Interval
 from torchbrdf.quadrature import gauss_legendre_rule
 
@@ -85,24 +86,16 @@ LARGEST_RMS_SLOPE = float(_slope_of(np.array([math.pi / 2]))[0])  # 1.482: sigma
 RMS_SLOPE = Interval(0.0, LARGEST_RMS_SLOPE, even=True)
 
 
+@constant
 @lru_cache(maxsize=1)
 def _slope_series() -> tuple[float, ...]:
     return _series_of(lambda sigma: _slope_of(sigma) / sigma, ROUGHNESS.high)
 
 
+@constant
 @lru_cache(maxsize=1)
 def _sigma_series() -> tuple[float, ...]:
     return _series_of(lambda slope: _sigma_of(slope) / slope, LARGEST_RMS_SLOPE)
-
-
-@torch.compiler.assume_constant_result
-def _constant_slope_series() -> tuple[float, ...]:
-    return _slope_series()
-
-
-@torch.compiler.assume_constant_result
-def _constant_sigma_series() -> tuple[float, ...]:
-    return _sigma_series()
 
 
 def _chebyshev(coefficients: tuple[float, ...], x: Tensor) -> Tensor:
@@ -124,7 +117,7 @@ def rms_slope_from_sigma(sigma: Tensor) -> Tensor:
     ROUGHNESS.check("rms_slope_from_sigma: sigma", sigma)
     # At least 1-D inside: forward differentiation of "number * 0-d float32 tensor" yields float64.
     x = torch.atleast_1d(sigma)
-    ratio = _chebyshev(_constant_slope_series(), 2 / _share(ROUGHNESS.high) * _share(x) - 1)
+    ratio = _chebyshev(_slope_series(), 2 / _share(ROUGHNESS.high) * _share(x) - 1)
     return (x * ratio).reshape(sigma.shape)
 
 
@@ -135,7 +128,7 @@ def sigma_from_rms_slope(rms_slope: Tensor) -> Tensor:
     """
     RMS_SLOPE.check("sigma_from_rms_slope: rms_slope", rms_slope)
     x = torch.atleast_1d(rms_slope)
-    ratio = _chebyshev(_constant_sigma_series(), 2 / _share(LARGEST_RMS_SLOPE) * _share(x) - 1)
+    ratio = _chebyshev(_sigma_series(), 2 / _share(LARGEST_RMS_SLOPE) * _share(x) - 1)
     return (x * ratio).reshape(rms_slope.shape)
 
 

@@ -22,6 +22,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from torchbrdf._constants import constant
 from torchbrdf._numerics import safe_divide, safe_sqrt
 from torchbrdf.models.heightfield.direct import Quadrature, direct_light
 from torchbrdf.models.heightfield.slope_frame import SlopeFrame
@@ -128,6 +129,7 @@ def smith_masking(slope: Tensor, nodes: Polar) -> Tensor:
     return ray(slope[..., None] * nodes.sin / nodes.cos, torch.zeros_like(slope)[..., None], _SMITH).masking
 
 
+@constant
 @lru_cache(maxsize=1)
 def slope_rule() -> tuple[list[float], list[float]]:
     """Slopes over their rms and their shares."""

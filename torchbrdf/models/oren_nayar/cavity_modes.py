@@ -24,6 +24,7 @@ import torch
 from numpy.polynomial import legendre
 from torch import Tensor
 
+from torchbrdf._constants import constant
 from torchbrdf._numerics import positive
 from torchbrdf.quadrature import gauss_legendre_rule
 
@@ -60,7 +61,7 @@ def _cached_modes(slopes: tuple[float, ...], count: int) -> tuple[np.ndarray, np
     return cavity_modes(np.array(slopes), count)
 
 
-@torch.compiler.assume_constant_result
+@constant
 def modes_of(slopes: tuple[float, ...], count: int, dtype: torch.dtype, device: torch.device) -> CavityModes:
     """`cavity_modes` as tensors, computed once per set of slopes."""
     eigenvalues, means = _cached_modes(slopes, count)
