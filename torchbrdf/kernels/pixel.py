@@ -87,10 +87,9 @@ def _frozen(value: object) -> Hashable | None:
 
 def formula(model: BRDF, tensors: Sequence[Tensor], normal: Tensor, light: Tensor, view: Tensor) -> Tensor:
     """f_r (..., channel) [1/sr] of the model with other stored tensors, in torch operations; nothing is checked."""
-    vectors = normal, light, view
-    cosines = Cosines._from_components(*(tuple(v.unbind(-1)) for v in vectors))  # pyright: ignore[reportArgumentType]
+    cosines = Cosines.from_products(dot(normal, light), dot(normal, view), dot(light, view))
     one = with_stored(model, dict(zip(stored(model), tensors, strict=True)))
-    return one.evaluate(replace(cosines, vectors=vectors))
+    return one.evaluate(replace(cosines, vectors=(normal, light, view)))
 
 
 def record(model: BRDF, sizes: Sequence[tuple[int, ...]], dtype: torch.dtype) -> Pixel:
