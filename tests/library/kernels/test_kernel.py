@@ -71,7 +71,7 @@ def test_float32_is_within_1e6_of_the_sum_of_the_terms(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NETWORKS)
 def test_float32_of_a_network_errs_as_the_formula_does(name):
-    model, kernel, arrays, weight = arrays_of(name, torch.float32)
+    model, kernel, arrays, weight = arrays_of(name, torch.float32, 8000)
     value, slopes = by_formula(model, arrays, weight)
     form = form_for(model)
     assert form is not None
@@ -80,9 +80,9 @@ def test_float32_of_a_network_errs_as_the_formula_does(name):
     by_torch = [eager.detach(), *torch.autograd.grad(eager, given, weight)]
     by_kernel = [kernel.value(arrays)[0], *kernel.slopes(arrays, weight, [True] * 5)]
     for mine, theirs, right in zip(by_kernel, by_torch, (value, *slopes), strict=True):
-        # all but the worst, of which few say little
-        error, expected = ((t - right).abs().reshape(-1).quantile(0.99) for t in (mine, theirs))
-        assert error <= 1.5 * expected
+        # not the worst: of those at grazing, some digits short in both, a handful decides
+        error, expected = ((t - right).abs().reshape(-1).quantile(0.95) for t in (mine, theirs))
+        assert error <= 1.2 * expected
 
 
 @pytest.mark.parametrize("single", [(0,), (1, 3), (2, 4)])
