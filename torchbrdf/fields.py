@@ -32,11 +32,7 @@ class FieldBRDF(BRDF):
 
     @abstractmethod
     def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
-        """The named parts of f_r (..., channel) [1/sr] made of fields (..., 1), in each of which they are linear.
-
-        A field that is a share [-], of light handed on to the next bounce, may also stand in the denominator of a
-        geometric series. All parts are 0 where all fields are.
-        """
+        """The named parts of f_r (..., channel) [1/sr] made of fields (..., 1): 0 where all fields are."""
 
     def sum_of(self, *fields: Tensor) -> Tensor:
         """The sum of `parts_of`; models override it where it takes fewer operations."""

@@ -9,7 +9,7 @@ from torch import Tensor
 from torchbrdf.brdf import BRDF, total
 from torchbrdf.directions import Cosines
 
-PIXELS_AT_A_TIME = 4096
+PIXELS_AT_A_TIME = 1024
 
 
 class LinearBRDF(BRDF):
@@ -80,13 +80,18 @@ class ImageBRDF(LinearBRDF):
         dtype = torch.promote_types(coefficients.dtype, cosines.light.dtype)
         coefficients = coefficients.to(dtype)
         if coefficients.ndim == 2:
-            return _in_pieces(lambda *c: self.images(*c).to(dtype) @ coefficients.mT, coordinates)
+            return _in_pieces(lambda *c: _times(self.images(*c).to(dtype), coefficients), coordinates)
         shape = torch.broadcast_shapes(coordinates[0].shape, coefficients.shape[:-2])
         rows = coefficients.expand(*shape, *coefficients.shape[-2:])
         wide = tuple(c.expand(shape) for c in coordinates)
         return _in_pieces(
             lambda row, *c: torch.einsum("...k,...ck->...c", self.images(*c).to(dtype), row), (rows, *wide)
         )
+
+
+def _times(images: Tensor, coefficients: Tensor) -> Tensor:
+    """Images (..., K) times coefficients (channel, K), from the left: pixels that are neighbours in memory stay so."""
+    return coefficients @ images if images.ndim == 1 else (coefficients @ images.mT).mT
 
 
 def _contract(coefficients: Tensor, terms: tuple[Tensor, ...]) -> Tensor:

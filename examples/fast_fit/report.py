@@ -7,88 +7,97 @@ import argparse
 import math
 
 import torch
-from reference import Sample, directions, exact
+from reference import ALBEDOS, Points, Quadrature, Truth, exact, reported_points
 from torch import Tensor
 
 from torchbrdf import FastRoughSurface, fast_rough_surface, fixed
-from torchbrdf.models.oren_nayar.fast import Bounces
 
-DEGREES = (0.7, 2.5, 5, 7, 11, 15, 21, 28, 36, 45, 52, 60)  # none of them fitted but 5 and 60
-ALBEDOS = (0.3, 0.5, 0.7, 0.9, 1.0)
-COUNT = 3000
-TOP = 85.0  # degrees
-STEP = 1e-4  # [rad] of the central difference by sigma
-BOUNCES: tuple[Bounces, ...] = (2, "all")
-DERIVED = (5, 10, 20, 30, 40, 50, 60)  # degrees
+ROUGHNESSES = (2.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0)  # degrees
+DERIVED = (2.0, 5.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
+FURNACE = torch.tensor([0, 20, 40, 60, 70, 75, 80, 83, 85], dtype=torch.float64)  # degrees
+COUNT = 800  # directions
+STEP = 1e-4  # [rad] of the difference by sigma
+TWICE = Quadrature(panel=16, azimuth=24, slopes=128, modes=16, later=16)
 
 
-def relative_errors(sample: Sample, bounces: Bounces) -> Tensor:
-    """Fit over exact less 1, (P, S, R). [%]"""
-    rho = torch.tensor(ALBEDOS, dtype=torch.float64)
-    cosines = sample.angles.cosines()
-    found = [fast_rough_surface(cosines, albedo=rho, sigma=s, bounces=bounces) for s in sample.sigmas]
-    return 100 * (math.pi * torch.stack(found, 1) / sample.total(rho, bounces) - 1)
+def rms(error: Tensor) -> float:
+    return float(error.square().mean().sqrt())
 
 
-def rms(error: Tensor) -> Tensor:
-    return error.square().mean().sqrt()
+def said(error: Tensor) -> str:
+    return f"{rms(error):.3f}/{error.abs().max():.2f}"
 
 
-def print_values(label: str, seed: int, *, edges: bool) -> None:
-    sigmas = torch.deg2rad(torch.tensor(DEGREES, dtype=torch.float64))
-    sample = exact(directions(seed, COUNT, TOP, edges=edges), sigmas, albedos=ALBEDOS)
-    errors = {bounces: relative_errors(sample, bounces) for bounces in BOUNCES}
-    print(f"\n{label}: max/rms % at rho = {ALBEDOS} | two bounces || all bounces")
-    for k, degrees in enumerate(DEGREES):
-        cells = [" ".join(f"{e.abs().max():.2f}/{rms(e):.3f}" for e in error[:, k].T) for error in errors.values()]
-        print(f"{degrees:5.1f}  {cells[0]}  ||  {cells[1]}")
-    for bounces, error in errors.items():
-        for name, some in (("0.3..0.9", error[..., :4]), ("1", error[..., 4:])):
-            print(f"  all sigma, rho {name}, bounces={bounces}: max {some.abs().max():.2f} rms {rms(some):.3f}")
+def errors(points: Points, truth: Truth) -> tuple[Tensor, Tensor]:
+    """Fit over exact less 1, of two and of all bounces (n, S, albedo). [%]"""
+    cosines = points.cosines()
+    two = fast_rough_surface(cosines, albedo=ALBEDOS, sigma=points.sigma, bounces=2)
+    every = fast_rough_surface(cosines, albedo=ALBEDOS, sigma=points.sigma, bounces="all")
+    return 100 * (two / truth.two(ALBEDOS) - 1), 100 * (every / truth.all() - 1)
 
 
-def print_derivatives(seed: int) -> None:
-    """d/dsigma against central differences of the exact model, relative to its rms over the directions."""
-    sigmas = torch.deg2rad(torch.tensor(DERIVED, dtype=torch.float64))
-    angles = directions(seed, 1000, TOP, edges=False)
-    sample = exact(angles, torch.cat((sigmas - STEP, sigmas + STEP)), albedos=ALBEDOS)
-    rho, cosines, count = torch.tensor(ALBEDOS, dtype=torch.float64), angles.cosines(), len(DERIVED)
-    print("\nderivative by sigma: rms % of its own rms at the same rho | two bounces || all bounces")
-    for k, degrees in enumerate(DERIVED):
-        cells = []
-        for bounces in BOUNCES:
-            total = sample.total(rho, bounces)
-            expected = (total[:, k + count] - total[:, k]) / (2 * STEP)
-
-            def value(sigma: Tensor, bounces: Bounces = bounces) -> Tensor:
-                return math.pi * fast_rough_surface(cosines, albedo=rho, sigma=sigma, bounces=bounces)
-
-            found = torch.func.jvp(value, (sigmas[k],), (torch.ones_like(sigmas[k]),))[1]
-            ratios = (found - expected).square().mean(0).sqrt() / expected.square().mean(0).sqrt()
-            cells.append(" ".join(f"{100 * r:.1f}" for r in ratios))
-        print(f"{degrees:5.1f}  {cells[0]}  ||  {cells[1]}")
-
-
-def print_furnace() -> None:
-    """Light returned at rho = 1: the exact surface returns all of it."""
-    cosine = torch.deg2rad(torch.tensor((0.0, 30, 50, 65, 75, 80, 85), dtype=torch.float64)).cos()
-    print("\ndirectional albedo at rho = 1, all bounces, less 1 (%): worst over 0..85 degrees")
-    for degrees in (5, 10, 20, 30, 40, 50, 60, 90):
-        sigma = torch.deg2rad(torch.tensor(degrees, dtype=torch.float64))
-        model = FastRoughSurface(albedo=fixed(torch.ones_like(sigma)), sigma=fixed(sigma), bounces="all")
-        excess = 100 * (model.directional_albedo(cosine, nodes=128) - 1)
-        print(f"{degrees:5.1f}  {excess.min():+.2f} {excess.max():+.2f}")
+def print_errors(label: str, points: Points, truth: Truth) -> None:
+    """Root mean square and largest error in %, by number of bounces and albedo."""
+    two, every = errors(points, truth)
+    cells = [said(two), said(every[..., :-1]), said(every[..., -1])]
+    print("{}: two bounces {}, all {} (rho .1 to .9), {} (rho 1)".format(label, *cells), flush=True)
 
 
 def report(seed: int) -> None:
-    print_values("REPORT, uniform", seed, edges=False)
-    print_values("REPORT, edges", seed + 1, edges=True)
-    print_derivatives(seed + 2)
-    print_furnace()
+    print(f"\nrms/largest error in %, rho {ALBEDOS.tolist()}, sigma 2 to 60 deg")
+    for low, high in ((0, 80), (0, 85), (85, 89)):
+        points = reported_points(COUNT, seed, low, high)
+        print_errors(f"larger angle {low} to {high} deg", points, exact(points))
+    crowded = reported_points(COUNT, seed + 1, 0, 85, crowded=True)
+    print_errors("crowded at grazing, in the plane of incidence and at light = view", crowded, exact(crowded))
+    points = reported_points(COUNT // 3, seed + 2, 0, 85, sigma=ROUGHNESSES)
+    truth = exact(points)
+    two, every = errors(points, truth)
+    for k, degrees in enumerate(ROUGHNESSES):
+        by_albedo = " ".join(said(e) for e in every[:, k].unbind(-1))
+        print(f"  sigma {degrees:2.0f} deg: two {said(two[:, k])}; all, by albedo {by_albedo}")
+    print("white furnace: directional albedo at rho = 1 less 1, in 1e-3, at", FURNACE.int().tolist())
+    for degrees in ROUGHNESSES:
+        sigma = torch.tensor(math.radians(degrees), dtype=torch.float64)
+        white = FastRoughSurface(albedo=fixed(torch.ones_like(sigma)), sigma=fixed(sigma))
+        got = white.directional_albedo(torch.deg2rad(FURNACE).cos(), nodes=128)[:, 0] - 1
+        print(f"  sigma {degrees:2.0f} deg: " + " ".join(f"{1000 * g:6.2f}" for g in got.tolist()))
+    print_derivatives(seed + 3)
+    print_convergence(seed + 4)
+
+
+def print_derivatives(seed: int) -> None:
+    """d/dsigma against central differences of the exact model, over its rms."""
+    points = reported_points(COUNT // 4, seed, 0, 85, sigma=DERIVED)
+    high, low = exact(points.moved(STEP)), exact(points.moved(-STEP))
+    cosines, one = points.cosines(), torch.ones_like(points.sigma)
+    print(f"derivative by sigma: rms error in % of its rms, at rho {ALBEDOS.tolist()} | two bounces || all")
+    columns = []
+    for bounces, above, below in ((2, high.two(ALBEDOS), low.two(ALBEDOS)), ("all", high.all(), low.all())):
+        expected = (above - below) / (2 * STEP)
+
+        def value(sigma: Tensor, bounces=bounces) -> Tensor:
+            return fast_rough_surface(cosines, albedo=ALBEDOS, sigma=sigma, bounces=bounces)
+
+        slope = torch.func.jvp(value, (points.sigma,), (one,))[1]
+        columns.append(100 * (slope - expected).square().mean(0).sqrt() / expected.square().mean(0).sqrt())
+    for degrees, *rows in zip(DERIVED, *columns, strict=True):
+        print(f"  sigma {degrees:2.0f} deg: " + " || ".join(" ".join(f"{x:.1f}" for x in row) for row in rows))
+
+
+def print_convergence(seed: int) -> None:
+    """The quadrature of the reference against one of twice the order."""
+    for low, high in ((0, 85), (85, 89.9)):
+        points = reported_points(COUNT // 80, seed, low, high)
+        truth, better = exact(points), exact(points, TWICE)
+        two = truth.two(ALBEDOS) / better.two(ALBEDOS) - 1
+        every = truth.all() / better.all() - 1
+        print(f"reference to {high} deg, orders doubled: {two.abs().max():.1e} (two), {every.abs().max():.1e} (all)")
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description="Judge FastRoughSurface.")
     parser.add_argument("--seed", type=int, default=61)
+    torch.set_default_dtype(torch.float64)
     torch.set_num_threads(1)
     report(parser.parse_args().seed)

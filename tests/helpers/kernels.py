@@ -4,7 +4,15 @@ import pytest
 import torch
 
 from helpers.probes import seeded
-from torchbrdf import BRDF, EON, FastGaussianHeightfield, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar
+from torchbrdf import (
+    BRDF,
+    EON,
+    FastGaussianHeightfield,
+    FastRoughSurface,
+    FujiiOrenNayar,
+    OrenNayar,
+    QualitativeOrenNayar,
+)
 from torchbrdf.kernels.forms import form_for
 from torchbrdf.kernels.machine import is_installed
 
@@ -26,6 +34,7 @@ MODELS = {
 
 # Networks, in which the sum of all terms is no measure: it grows from layer to layer without bound.
 NETWORKS = {
+    "fast V-cavities": lambda albedo, rough: FastRoughSurface(albedo=albedo, sigma=rough),
     "fast heightfield": lambda albedo, rough: FastGaussianHeightfield(albedo=albedo, sigma=rough),
 }
 

@@ -7,7 +7,7 @@ import torch
 from helpers.probes import doubles, few, held
 from torch.testing import assert_close
 
-from torchbrdf import EON, Cosines, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar
+from torchbrdf import EON, Cosines, FastRoughSurface, FujiiOrenNayar, OrenNayar, QualitativeOrenNayar
 from torchbrdf.fields import FieldBRDF
 
 RHO = [0.7, 0.4, 0.1]
@@ -42,6 +42,16 @@ def test_fields_say_what_images_and_coefficients_say(brdf):
         assert_close(cosines.zero_below_horizon(part), by_images, rtol=1e-13, atol=1e-15)
     by_images = (brdf.basis(cosines)[..., None, :] * brdf.coefficients()).sum(-1)
     assert_close(brdf.evaluate(cosines), by_images, rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("bounces", [2, "all"])
+def test_later_bounces_are_no_linear_field_but_vanish_below_the_horizon(bounces):
+    brdf = FastRoughSurface(albedo=held(RHO), sigma=held(0.6), bounces=bounces)
+    fields = [field[..., None] for field in brdf.fields(Cosines.of(*few()))]
+    assert_close(brdf.sum_of(*fields), sum(brdf.parts_of(*fields).values()), rtol=1e-13, atol=1e-16)
+    assert all((part == 0).all() for part in brdf.parts_of(*(0 * field for field in fields)).values())
+    normal, light, view = few()
+    assert (brdf(normal, -light, view) == 0).all()
 
 
 class Sheen(FieldBRDF):

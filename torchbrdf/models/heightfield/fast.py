@@ -13,24 +13,12 @@ from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
 from torchbrdf.fields import FieldBRDF
 from torchbrdf.models.heightfield.coordinates import Coordinates, coordinates, slope_squared
+from torchbrdf.models.network import Network, bounded, pixel_by_pixel
 from torchbrdf.models.rungs import Member, lambert, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
-# Bytes of one field worked on at a time: a few dozen of them stay in a core's cache.
-_BYTES_AT_A_TIME = 32768
 _LARGEST_KEPT = 0.8  # of light that three bounces hand on to the fourth
-
-
-class Network(NamedTuple):
-    """o = W3 [h(W2 [h(W1 x; b1)]; b2)] + b3 with h(u; b) = a(u + b) - a(b), a(u) = u/sqrt(1 + u^2)."""
-
-    first: Tensor  # (hidden, 7)
-    first_bias: Tensor  # (hidden, 1)
-    second: Tensor
-    second_bias: Tensor
-    last: Tensor  # (4, hidden)
-    last_bias: Tensor  # (4, 1)
 
 
 class HeightfieldFields(NamedTuple):
@@ -51,8 +39,7 @@ class _Fit(NamedTuple):
 
 def _read(path: Path) -> _Fit:
     stored = json.loads(path.read_text())
-    network = Network(*(torch.tensor(stored[name], dtype=torch.float64) for name in Network._fields))
-    return _Fit(tuple(stored["slope"]), network)
+    return _Fit(tuple(stored["slope"]), Network.of(stored))
 
 
 _FIT = _read(Path(__file__).with_name("fast_heightfield.json"))
@@ -60,41 +47,24 @@ _FIT = _read(Path(__file__).with_name("fast_heightfield.json"))
 
 def heightfield_fields(cosines: Cosines, sigma: Tensor) -> HeightfieldFields:
     """The fields (...) at directions (...), for sigma (...) [rad]; finite below the horizon."""
-    shape = torch.broadcast_shapes(cosines.light.shape, sigma.shape)
-    given = (cosines.light, cosines.view, cosines.phase, cosines.azimuth_sine, sigma)
-    # Spread over the pixels first: the derivative by a single sigma is then one sum over the image.
-    rows = [t.expand(shape).reshape(-1) for t in given]
-    step = _BYTES_AT_A_TIME // rows[0].element_size()
-    if torch.compiler.is_compiling() or shape.numel() <= step:
-        fields = _fields(*rows)
-    else:
-        pieces = zip(*(row.split(step) for row in rows), strict=True)
-        fields = [torch.cat(parts) for parts in zip(*(_fields(*piece) for piece in pieces), strict=True)]
-    return HeightfieldFields(*(field.reshape(shape) for field in fields))
+    c = cosines
+    return HeightfieldFields(*pixel_by_pixel(_fields, c.light, c.view, c.phase, c.azimuth_sine, sigma))
 
 
 def _fields(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor, sigma: Tensor) -> HeightfieldFields:
-    place = coordinates(light, view, phase, azimuth_sine, slope_squared(sigma, _FIT.slope))
-    return fields_from(place, Network(*(t.to(place.features) for t in _FIT.network)))
+    return fields_from(coordinates(light, view, phase, azimuth_sine, slope_squared(sigma, _FIT.slope)), _FIT.network)
 
 
 def fields_from(place: Coordinates, network: Network) -> HeightfieldFields:
     """The fields (n,) of coordinates (7, n), (n,), (n,)."""
-    n = network
-    hidden = _bounded(torch.addmm(n.first_bias, n.first, place.features)) - _bounded(n.first_bias)
-    hidden = _bounded(torch.addmm(n.second_bias, n.second, hidden)) - _bounded(n.second_bias)
-    direct, two, third, kept = torch.addmm(n.last_bias, n.last, hidden).unbind(0)
+    direct, two, third, kept = network.outputs(place.features).unbind(0)
     share = place.share
     return HeightfieldFields(
         place.masked * (direct.exp() / math.pi),
         share * two.exp(),
         share * share * third.exp(),
-        _LARGEST_KEPT * _bounded(kept),
+        _LARGEST_KEPT * bounded(kept),
     )
-
-
-def _bounded(u: Tensor) -> Tensor:
-    return u * torch.rsqrt(1 + u * u)
 
 
 def reflectance(albedo: Tensor, fields: HeightfieldFields) -> dict[str, Tensor]:

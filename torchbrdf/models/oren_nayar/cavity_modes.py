@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
-from numpy.polynomial import legendre
+from numpy.polynomial import chebyshev, legendre
 from torch import Tensor
 
 from torchbrdf._constants import constant
@@ -38,7 +38,7 @@ _RANK = 1e-13  # singular values below this share of the largest are rounding
 
 
 class CavityModes(NamedTuple):
-    """Modes of K slopes. Q_n(1 - s) = s G_n(s), G_n expanded in Legendre polynomials of s, m^2 log(m) and the strip
+    """Modes of K slopes. Q_n(1 - s) = s G_n(s), G_n expanded in Chebyshev polynomials of s, m^2 log(m) and the strip
     mean of g (m = 1 - s).
     """
 
@@ -72,10 +72,10 @@ def modes_of(slopes: tuple[float, ...], count: int, dtype: torch.dtype, device: 
 
 def strip_means(modes: CavityModes, strip: Tensor) -> Tensor:
     """G_n(s) for strip widths s (..., K, node) in [0, 1]; result (..., K, N, node). [-]"""
-    x = 2 * strip - 1
-    terms = [torch.ones_like(x), x]
-    for n in range(1, modes.strip_means.shape[-1] - 3):
-        terms.append(((2 * n + 1) * x * terms[-1] - n * terms[-2]) / (n + 1))
+    twice = 4 * strip - 2
+    terms = [torch.ones_like(strip), 0.5 * twice]
+    while len(terms) < modes.strip_means.shape[-1] - 2:
+        terms.append(twice * terms[-1] - terms[-2])
     hidden = positive(1 - strip)
     valley = hidden * hidden * hidden.log()
     ridge = 4 * (modes.cos_slope * modes.cos_slope)[:, None]  # squared distance of the two ridges
@@ -153,7 +153,7 @@ def _couplings(space: Callable[[np.ndarray], np.ndarray], cosine: float, sine: f
     # Light next to the valley meets ever more of the opposite facet: a term m^2 log(m) that polynomials would chase in
     # vain.
     valley = (1 - strip) ** 2 * np.log(1 - strip)
-    basis = np.concatenate((legendre.legvander(u, terms - 3), valley[:, None], sent[:, None]), axis=1)
+    basis = np.concatenate((chebyshev.chebvander(u, terms - 3), valley[:, None], sent[:, None]), axis=1)
     # the uncut facet, by far the most frequent case, to all digits
     weight = np.where(strip > 1 - _UNCUT, 1e3, 1.0)[:, None]
     return np.linalg.lstsq(weight * basis, weight * np.stack(values) / strip[:, None], rcond=_RANK)[0].T

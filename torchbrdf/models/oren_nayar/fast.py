@@ -1,12 +1,7 @@
-"""The exact V-cavity rough surface as a reciprocal fit without angles.
-
-Two bounces, compiled, one trained sigma, a million pixels, float32, one core: 1.8 times (forward) and about 7 times
-(forward and backward) the functional approximation.
-"""
+"""The exact V-cavity rough surface as a reciprocal fit without angles: some hundred nanoseconds a pixel."""
 
 import json
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, final
 
@@ -14,174 +9,128 @@ import torch
 from torch import Tensor
 
 from torchbrdf import effects
-from torchbrdf.brdf import BRDF, Option
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
+from torchbrdf.fields import FieldBRDF
+from torchbrdf.models.network import Network, bounded, pixel_by_pixel
+from torchbrdf.models.oren_nayar.coordinates import Coordinates, coordinates, slope_squared
 from torchbrdf.models.oren_nayar.functional import OrenNayar
-from torchbrdf.models.oren_nayar.ring import KAPPA, KNEE, Ring, Term, chebyshev, chebyshev_slope, contract, knee, ring
 from torchbrdf.models.rungs import Member, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, kept
 from torchbrdf.sampling import CltcSampled, equivalent_roughness
 
 Bounces = Literal[2, "all"]
+_BOUNCES = (2, "all")
+_LARGEST_KEPT = 0.98  # of light that a bounce in a cavity hands on to the next
 
 
-class _Fit(NamedTuple):
-    """Numbers of `fast_rough_surface.json` (made by `examples/fast_fit`)."""
+class CavityFields(NamedTuple):
+    """What unit albedo returns after one, two and three bounces, each (...) [1/sr], and what becomes of the rest.
 
-    terms: dict[str, list[Term]]
-    orders: dict[str, list[int]]  # power of x in front of each series
-    series: dict[str, list[list[float]]]  # Chebyshev coefficients in 2x - 1
-    table: Tensor  # (terms of all parts, 3 * length of a series): the same numbers against [T, x T, x^2 T]
-    resonance: tuple[float, float, float]
+    The third bounce and all later ones are (third - rho later)/((1 - rho kept)(1 - rho kept/2)).
+    """
 
-
-_PARTS: dict[Bounces, tuple[str, ...]] = {
-    2: ("direct", "two_bounce"),
-    "all": ("direct", "two_bounce", "resonant", "plain"),
-}
+    direct: Tensor
+    two_bounce: Tensor
+    third: Tensor
+    later: Tensor
+    kept: Tensor  # [-]
 
 
-def _read(path: Path) -> _Fit:
-    numbers = json.loads(path.read_text())
-    names = _PARTS["all"]
-    terms = {n: [(t["factor"], *t["powers"]) for t in numbers[n]] for n in names}
-    orders = {n: [t["order"] for t in numbers[n]] for n in names}
-    series = {n: [t["series"] for t in numbers[n]] for n in names}
-    rows = []
-    for name in names:
-        for order, row in zip(orders[name], series[name], strict=True):
-            rows.append([*[0.0] * (len(row) * order), *row, *[0.0] * (len(row) * (2 - order))])
-    return _Fit(terms, orders, series, torch.tensor(rows, dtype=torch.float64), tuple(numbers["resonance"]))
+_FIT = Network.of(json.loads(Path(__file__).with_name("fast_rough_surface.json").read_text()))
 
 
-_FIT = _read(Path(__file__).with_name("fast_rough_surface.json"))
+def cavity_fields(cosines: Cosines, sigma: Tensor) -> CavityFields:
+    """The fields (...) at directions (...), for sigma (...) [rad]; finite below the horizon."""
+    c = cosines
+    # At least 1-D: forward differentiation of "number * 0-d float32 tensor" yields float64.
+    squared = slope_squared(torch.atleast_1d(sigma)).reshape(sigma.shape)
+    return CavityFields(*pixel_by_pixel(_fields, c.light, c.view, c.phase, c.azimuth_sine, squared))
+
+
+def _fields(light: Tensor, view: Tensor, phase: Tensor, azimuth_sine: Tensor, squared: Tensor) -> CavityFields:
+    return fields_from(coordinates(light, view, phase, azimuth_sine, squared), _FIT)
+
+
+def fields_from(place: Coordinates, network: Network) -> CavityFields:
+    """The fields (n,) of coordinates (7, n), (n,), (n,)."""
+    direct, two, first, second, kept = network.outputs(place.features).unbind(0)
+    share, kept = place.share, _LARGEST_KEPT * bounded(kept)
+    squared = share * share
+    first, second = squared * first.exp(), squared * second.exp()
+    return CavityFields(
+        place.growth * (direct.exp() / math.pi), share * two.exp(), first + second, kept * (0.5 * first + second), kept
+    )
+
+
+def parts(albedo: Tensor, direct: Tensor, two_bounce: Tensor, *more: Tensor) -> dict[str, Tensor]:
+    """The named parts (..., channel) [1/sr] of the first fields (..., 1), or of all of them."""
+    rho = torch.atleast_1d(albedo)
+    squared = rho * rho
+    named = {"direct": rho * direct, "two_bounce": squared * two_bounce}
+    return named | {"higher": squared * rho * _higher(rho, *more)} if more else named
+
+
+def reflectance(albedo: Tensor, direct: Tensor, two_bounce: Tensor, *more: Tensor) -> Tensor:
+    """The sum of `parts`, in fewer steps."""
+    rho = torch.atleast_1d(albedo)
+    bounced = two_bounce + rho * _higher(rho, *more) if more else two_bounce
+    return rho * (direct + rho * bounced)
+
+
+def _higher(rho: Tensor, third: Tensor, later: Tensor, kept: Tensor) -> Tensor:
+    again = rho * kept
+    return (third - rho * later) / ((1 - again) * (1 - 0.5 * again))
 
 
 def fast_rough_surface(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, bounces: Bounces) -> Tensor:
     r"""Reflectance of isotropic V-cavities with Gaussian slopes, fitted to the exact integral over slopes and azimuths.
 
     .. math::
-        \pi f_r &= \rho\, d + \rho^2\, i
-                   + \rho^3 \Bigl[\frac{g_0}{1 - \rho\lambda} + \frac{g_1}{1 - \rho\lambda/2}\Bigr] \\
-        d &= 1 - \frac{\sigma^2}{1 + \sigma^2/\epsilon^2} + \frac{A}{\kappa^2} + p_d, \quad
-        i = \frac{\sigma^2}{1 + \sigma^2/\epsilon^2} + p_i
+        f_r &= \rho f_1 + \rho^2 f_2
+               + \rho^3 \Bigl[\frac{g_0}{1 - \rho k} + \frac{g_1}{1 - \rho k/2}\Bigr] \
+        \pi f_1 &= (1 + c/2)\, e^{o_1}, \quad f_2 = y\, e^{o_2}, \quad g_0 = y^2 e^{o_3}, \quad
+        g_1 = y^2 e^{o_4}, \quad k = 0.98\, a(o_5), \quad y = \frac{z^2}{1 + z^2}
 
-    d and i are what unit albedo returns after one and two bounces, g_0 and g_1 carry all the others, lambda(sigma)
-    is an effective share of light that a cavity keeps for itself. p_d, p_i, g_0, g_1 are sums of terms
-    (1, D, P or G) A^i S^j Q^k of the ring coordinates (`ring.py`) with coefficients that are series in
-    sigma^2/(sigma^2 + epsilon^2).
+    g_0 and g_1 carry three and more bounces, k(sigma, directions) is an effective share of light that a cavity keeps
+    for itself. o_1 .. o_5 are smooth functions of seven coordinates (`coordinates.py`) through two small layers of
+    a(u) = u/sqrt(1 + u^2) (`Network`); c is what light and view are both shaded from, z(sigma) the facets' slope.
 
     Args:
         cosines: of light, view and phase angle, each (...).
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
         sigma: roughness, scalar or (...). [rad] in [0, pi/2]; 0 is Lambert exactly.
         bounces: 2, or "all".
-    Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
+    Returns: f_r (..., channel) [1/sr], above 0; zero unless light and view are above the horizon.
     Raises: ValueError when albedo or sigma leave their domains, or for other bounces.
-    Deviations: a fit. Up to 85 degrees, sigma up to 60 degrees and rho 0.3 to 0.9, on directions it was not fitted
-        to: rms 0.17 % (two bounces) and 0.22 % (all), 0.18 % and 0.25 % where half of them crowd in the plane of
-        incidence, at light = view and at grazing; at most 2.8 % and 3.0 % of the total. Worst at sigma = 60 degrees
-        and rho = 0.9: rms 0.39 % and 0.64 %. At rho = 1 with all bounces up to 14 % (rms 0.7 %, 1.5 % at 60 degrees),
-        and the directional albedo is within 1.7 % of 1. The derivative by sigma errs by 1-4 % rms (two bounces) and
-        1-9 % (all; worst at 60 degrees and rho = 0.9; 12-25 % at rho = 1 from 30 degrees on). Beyond 86 degrees:
-        bounded f cos, no figures. At light = view, a cone of the exact reflectance, the subgradient is 0. Compiled
-        with one trained sigma, first derivatives only: take second ones from the function as it is.
-    Source: fitted here to the exact model (`examples/fast_fit`); small-sigma form from the expansion
-        of the integral, d ~ 1 - sigma^2 + sigma^2 p.q, i ~ sigma^2 (`docs/equations/oren_nayar.md`, section 6).
+    Deviations: a fit. From the exact model, rho 0.1 to 0.9 and sigma 2 to 60 deg, on points it was not fitted to, two
+        or all bounces: rms 0.12 % and at most 0.9 % up to 85 deg, rms 0.13 % where they crowd at grazing, in the plane
+        of incidence and at light = view; rms 0.29 %, at most 6 %, from 85 to 89 deg. Worst at sigma = 60 deg and
+        rho = 0.9: rms 0.27 %. At rho = 1 with all bounces rms 0.23 %, at most 6.4 % (next to the normal, steep facets),
+        and the directional albedo is within 1.5e-3 of 1 up to 85 deg. The derivative by sigma errs by 1-4 % rms, from
+        sigma = 50 deg or rho = 0.9 on by 2-9 %, at rho = 1 by up to 17 %. Like the exact model it has a cone at
+        light = view, with subgradient 0, and no other kink. Beyond 89 deg: f cos stays bounded, no figures.
+    Source: fitted here to the exact model (`examples/fast_fit`).
     """
     ALBEDO.check("fast_rough_surface: albedo", albedo)
     ROUGHNESS.check("fast_rough_surface: sigma", sigma)
     _check_bounces("fast_rough_surface", bounces)
-    parts = _components(cosines, albedo, sigma, bounces)
-    total = parts["direct"] + parts["two_bounce"]
-    return cosines.zero_below_horizon(total + parts["higher"] if bounces == "all" else total)
+    fields = cavity_fields(cosines, sigma)[: _needed(bounces)]
+    return reflectance(albedo, *((field * cosines.lit)[..., None] for field in fields))
 
 
-def _components(cosines: Cosines, albedo: Tensor, sigma: Tensor, bounces: Bounces) -> dict[str, Tensor]:
-    """Named parts (..., channel) [1/sr]; finite below the horizon."""
-    rho = torch.atleast_1d(albedo)
-    # Spread over the pixels first: the derivative by a single sigma is then one sum over the image.
-    spread = sigma.expand(torch.broadcast_shapes(sigma.shape, cosines.light.shape))
-    r = ring(cosines, spread)
-    lead = KNEE**2 * knee(spread)
-    sums = _polynomials(r, sigma, bounces)
-    parts = {
-        # The bounds act within a degree of the horizon only, where forward reflectance itself tends to 0.
-        "direct": rho * ((1 - lead + r.along / KAPPA**2 + sums["direct"]).clamp(min=0) / math.pi)[..., None],
-        "two_bounce": rho * rho * ((lead + sums["two_bounce"]).clamp(min=0) / math.pi)[..., None],
-    }
-    if bounces == "all":
-        top, half, ratio = _FIT.resonance
-        s4 = spread * spread * spread * spread
-        kept = rho * (top * s4 / (s4 + half))[..., None]
-        first, second = 1 - kept, 1 - ratio * kept
-        numerator = sums["resonant"][..., None] * second + sums["plain"][..., None] * first
-        parts["higher"] = rho * rho * rho * numerator.clamp(min=0) / (math.pi * first * second)
-    return parts
-
-
-def _polynomials(r: Ring, sigma: Tensor, bounces: Bounces) -> dict[str, Tensor]:
-    """p_d, p_i and, for all bounces, g_0, g_1, each (...)."""
-    # At least 1-D: forward differentiation of "number * 0-d float32 tensor" yields float64.
-    x = knee(torch.atleast_1d(sigma))
-    length = len(_FIT.series["direct"][0])
-    row = chebyshev(x, length)
-    names = _PARTS[bounces]
-    if torch.compiler.is_compiling() and sigma.numel() > 1:
-        # A field of roughness: written out, the series stay inside the one fused loop over pixels.
-        weights = {n: [_series(x, row, *k) for k in zip(_FIT.orders[n], _FIT.series[n], strict=True)] for n in names}
-    elif torch.compiler.is_compiling() and torch.is_grad_enabled() and sigma.requires_grad:
-        return _first_order(r, sigma, names)
-    else:
-        powers = torch.stack((*row, *(x * t for t in row), *(x * x * t for t in row)), dim=-1)
-        weights = _weights(powers.reshape(*sigma.shape, -1), names)
-    return {n: contract(r, _FIT.terms[n], weights[n]) for n in names}
-
-
-def _weights(powers: Tensor, names: Sequence[str]) -> dict[str, list[Tensor]]:
-    """Weights (...) of the terms of each part from [T, x T, x^2 T] (..., 3 * length), or from its derivative."""
-    count = sum(len(_FIT.terms[n]) for n in names)
-    columns = iter((powers @ _FIT.table[:count].to(powers).T).unbind(-1))
-    return {n: [next(columns) for _ in _FIT.terms[n]] for n in names}
-
-
-def _first_order(r: Ring, sigma: Tensor, names: Sequence[str]) -> dict[str, Tensor]:
-    """The polynomials p with dp/dsigma attached as a number a pixel, for one compiled sigma: right to first order.
-
-    The derivative of each weight would be a sum over the image of its own, some forty of them; so it is one.
-    """
-    s = torch.atleast_1d(sigma.detach())
-    x, row_slope = knee(s), chebyshev_slope(knee(s), len(_FIT.series["direct"][0]))
-    row = chebyshev(x, len(row_slope))
-    powers = torch.stack((*row, *(x * t for t in row), *(x * x * t for t in row)), dim=-1)
-    pairs = list(zip(row, row_slope, strict=True))
-    slopes = (*row_slope, *(t + x * d for t, d in pairs), *(x * (2 * t + x * d) for t, d in pairs))
-    by_sigma = torch.stack(slopes, dim=-1) * (2 * s * (KNEE / (s * s + KNEE**2)) ** 2)[..., None]
-    value = _weights(powers.reshape(*sigma.shape, -1), names)
-    slope = _weights(by_sigma.reshape(*sigma.shape, -1), names)
-    step = sigma.expand(r.along.shape)
-    step = step - step.detach()  # 0, with derivative 1
-    still = Ring(*(t.detach() for t in r))
-    return {n: contract(r, _FIT.terms[n], value[n]) + step * contract(still, _FIT.terms[n], slope[n]) for n in names}
-
-
-def _series(x: Tensor, row: list[Tensor], order: int, coefficients: list[float]) -> Tensor:
-    """x^order sum_j coefficients[j] row[j] (...)."""
-    total = coefficients[0] * row[0]
-    for c, t in zip(coefficients[1:], row[1:], strict=True):
-        total = total + c * t
-    for _ in range(order):
-        total = total * x
-    return total
+def _needed(bounces: Bounces) -> int:
+    """How many of the fields."""
+    return 2 if bounces == 2 else len(CavityFields._fields)
 
 
 def _check_bounces(name: str, bounces: object) -> None:
-    if bounces not in _PARTS:
+    if bounces not in _BOUNCES:
         raise ValueError(f'{name}: bounces must be 2 or "all"; found {bounces!r}.')
 
 
 @final
-class FastRoughSurface(CltcSampled, BRDF):
+class FastRoughSurface(CltcSampled, FieldBRDF):
     """Fit of the exact V-cavity rough surface as a module; see `fast_rough_surface` for equation, units and deviations.
 
     Args:
@@ -205,8 +154,14 @@ class FastRoughSurface(CltcSampled, BRDF):
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
 
-    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
-        return _components(cosines, self.albedo, self.sigma, self.bounces)
+    def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:
+        return cavity_fields(cosines, self.sigma)[: _needed(self.bounces)]
+
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
+        return parts(self.albedo, *fields)
+
+    def sum_of(self, *fields: Tensor) -> Tensor:
+        return reflectance(self.albedo, *fields)
 
     def members(self) -> list[Member]:
         """The ladder up to this model."""

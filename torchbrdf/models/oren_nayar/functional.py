@@ -46,7 +46,8 @@ def oren_nayar(cosines: Cosines, *, albedo: Tensor, sigma: Tensor) -> Tensor:
     Raises: ValueError when albedo or sigma leave their domains.
     Deviations: a fit. From the exact model with all bounces it errs by 6 % rms and 74 % at worst
         (forward, grazing; up to 85 deg, sigma 5..60 deg, rho 0.3..0.9; `examples/benchmarks/ladder.py`);
-        it turns negative at forward grazing for sigma > 0.66 rad, and at rho = 1 its directional albedo
+        it turns negative at forward grazing for sigma > 0.66 rad (rho -> 0; at cosines of 1e-15 for less, where
+        the tangent multiplies what rounding leaves of a difference), and at rho = 1 its directional albedo
         reaches 1.05 at grazing.
     Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
         (1995, DOI 10.1007/BF01679684), eqs. (27)-(29).

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import torch
 from torch import Tensor
 
-from torchbrdf.models.oren_nayar.azimuth import common_excess, direct_from, saturated_correlation, saturated_lobes
-from torchbrdf.models.oren_nayar.azimuth_quadrature import higher_bounce_means, two_bounce_mean
+from torchbrdf.models.oren_nayar.azimuth import direct_mean, saturated_correlation, saturated_lobes
+from torchbrdf.models.oren_nayar.azimuth_quadrature import higher_bounce_means, one_cut, two_bounce_mean
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, bounce_coefficients, facet_modes
 from torchbrdf.models.oren_nayar.interreflection import two_bounce_facet
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane
@@ -60,7 +60,8 @@ class Images(NamedTuple):
 
     def flat(self) -> Tensor:
         """All images along one axis: (..., K), (..., 2 K) or (..., 2 K + 2 K N)."""
-        return torch.cat((self.direct, self.two_bounce, self.higher.flatten(-3)), -1)
+        parts = (self.direct, self.two_bounce, self.higher.flatten(-3))
+        return torch.cat([part.movedim(-1, 0) for part in parts]).movedim(0, -1)  # pixels lie next to each other
 
 
 def mean_images(
@@ -83,16 +84,54 @@ def mean_images(
         graded: azimuth pieces of the reference, see `azimuth_quadrature`.
     Returns: `Images`, not masked at the horizon. [1/sr]
     """
-    wide = SlopePlane(*(field[..., None] for field in plane))
-    lobes = saturated_lobes(wide, cos_slope=cos_slope, tan_slope=tan_slope)
+    slope = {"cos_slope": cos_slope, "tan_slope": tan_slope}
+    direct = direct_images(plane, **slope)
+    return Images(direct, *exchange_images(plane, **slope, bounces=bounces, order=order, graded=graded, modes=modes))
+
+
+def direct_images(plane: SlopePlane, *, cos_slope: Tensor, tan_slope: Tensor) -> Tensor:
+    """The direct images (..., K) of `mean_images`. [1/sr]"""
+    shape = torch.broadcast_shapes(plane.dot.shape, cos_slope.shape[:-1])
+    slope = {"cos_slope": _slopes_first(cos_slope, shape), "tan_slope": _slopes_first(tan_slope, shape)}
+    return _slopes_last(direct_mean(_pixels_last(plane, shape), **slope), shape)
+
+
+def exchange_images(
+    plane: SlopePlane,
+    *,
+    cos_slope: Tensor,
+    tan_slope: Tensor,
+    bounces: Bounces,
+    order: int,
+    graded: bool = False,
+    modes: CavityModes | None = None,
+) -> tuple[Tensor, Tensor]:
+    """The images of two bounces (..., K) and more (..., K, N, 2) of `mean_images`, empty where not followed. [1/sr]"""
+    shape = torch.broadcast_shapes(plane.dot.shape, cos_slope.shape[:-1])
+    wide = _pixels_last(plane, shape)
+    lobes = saturated_lobes(wide, cos_slope=_slopes_first(cos_slope, shape), tan_slope=_slopes_first(tan_slope, shape))
     correlation = saturated_correlation(wide, lobes)
-    direct = direct_from(common_excess(wide, lobes), correlation, cos_slope)
-    two = two_bounce_mean(wide, lobes, correlation, order=order, graded=graded) if bounces.two else direct[..., :0]
-    if modes is None:
-        higher = direct.new_zeros((*direct.shape[:-1], 0, 0, 2))
-    else:
-        higher = higher_bounce_means(wide, lobes, correlation, modes, order=order, graded=graded)
-    return Images(direct, two, higher)
+    two, higher = correlation[:0], correlation.new_zeros((0, 0, 2, correlation.shape[-1]))
+    nodes = {"order": order, "graded": graded, "one": one_cut(wide, lobes, order, graded=graded)}
+    if bounces.two:
+        two = two_bounce_mean(wide, lobes, correlation, **nodes)
+    if modes is not None:
+        higher = higher_bounce_means(wide, lobes, correlation, modes, **nodes)
+    return _slopes_last(two, shape), _slopes_last(higher, shape)
+
+
+def _pixels_last(plane: SlopePlane, shape: torch.Size) -> SlopePlane:
+    """Fields (1, pixel): every operation then runs along pixels, and matrices of slopes are few and large."""
+    return SlopePlane(*(field.expand(shape).reshape(1, -1) for field in plane))
+
+
+def _slopes_first(slope: Tensor, shape: torch.Size) -> Tensor:
+    """Slopes (K,) or (..., K) as (K, 1) or (K, pixel)."""
+    return slope[:, None] if slope.ndim == 1 else slope.expand(*shape, slope.shape[-1]).flatten(0, -2).mT
+
+
+def _slopes_last(images: Tensor, shape: torch.Size) -> Tensor:
+    return images.movedim(-1, 0).reshape(*shape, *images.shape[:-1])
 
 
 def cavity_images(
@@ -121,20 +160,26 @@ def cavity_images(
 
 
 def flat_coefficients(
-    weights: Tensor, albedo: Tensor, *, bounces: Bounces, eigenvalues: Tensor | None = None
+    weights: Tensor,
+    albedo: Tensor,
+    *,
+    bounces: Bounces,
+    eigenvalues: Tensor | None = None,
+    direct_weights: Tensor | None = None,
 ) -> dict[str, Tensor]:
     """What each bounce takes of each image of `Images.flat`.
 
     Args:
         weights: of the slopes, (K,) or (..., K). [-]
+        direct_weights: of the slopes of direct light, if it has slopes of its own. [-]
         albedo: rho, scalar, (channel,) or (..., channel). [-]
         eigenvalues: of the modes (K, N), for three and more bounces.
     Returns: direct, two_bounce, higher, as far as followed: (..., channel, images). [-]
     """
     rho = torch.atleast_1d(albedo)[..., None]
     shares = weights[..., None, :]
-    direct = rho * shares
-    two = rho * direct
+    direct = rho * (shares if direct_weights is None else direct_weights[..., None, :])
+    two = rho * rho * shares
     counts = [direct.shape[-1], two.shape[-1] if bounces.two else 0, 0]
     higher = direct[..., :0]
     if eigenvalues is not None:

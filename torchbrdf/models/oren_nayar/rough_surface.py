@@ -14,7 +14,7 @@ from torchbrdf.models.oren_nayar.azimuth_paper import direct_mean_paper, two_bou
 from torchbrdf.models.oren_nayar.cavity_modes import CavityModes, modes_of
 from torchbrdf.models.oren_nayar.fast import FastRoughSurface
 from torchbrdf.models.oren_nayar.functional import OrenNayar
-from torchbrdf.models.oren_nayar.images import Bounces, flat_coefficients, mean_images
+from torchbrdf.models.oren_nayar.images import Bounces, Images, direct_images, exchange_images, flat_coefficients
 from torchbrdf.models.oren_nayar.slope_plane import SlopePlane, slope_plane
 from torchbrdf.models.rungs import Member, stand_ins
 from torchbrdf.parameters import ALBEDO, ROUGHNESS, Constrained, ParameterValue, Simplex, fixed, kept
@@ -53,6 +53,14 @@ class SharedSlopes(CltcSampled, ImageBRDF):
     def slope_weights(self) -> Tensor:
         """Shares of the slopes in the horizontal area, (nodes,) or (..., nodes); they sum to 1. [-]"""
 
+    def direct_slopes(self) -> tuple[float, ...]:
+        """Slope angles of direct light: those of the interreflection unless the subclass says otherwise. [rad]"""
+        return shared_slopes(self.nodes)
+
+    def direct_weights(self) -> Tensor:
+        """Shares of `direct_slopes`, which sum to 1. [-]"""
+        return self.slope_weights()
+
     @property
     @abstractmethod
     def _rho(self) -> Tensor:
@@ -63,28 +71,41 @@ class SharedSlopes(CltcSampled, ImageBRDF):
 
     def images(self, *coordinates: Tensor) -> Tensor:
         plane = SlopePlane(*coordinates)
-        slopes = plane.dot.new_tensor(shared_slopes(self.nodes), dtype=torch.float64)
-        images = mean_images(
+        direct = direct_images(plane, **_sides(self.direct_slopes(), plane.dot))
+        if not self._bounces.two:
+            return direct
+        exchanged = exchange_images(
             plane,
-            cos_slope=slopes.cos().to(plane.dot.dtype),
-            tan_slope=slopes.tan().to(plane.dot.dtype),
+            **_sides(shared_slopes(self.nodes), plane.dot),
             bounces=self._bounces,
             order=self.order,
             graded=self.graded,
             modes=self._modes(plane.dot),
         )
-        return images.flat()
+        return Images(direct, *exchanged).flat()
 
     def component_coefficients(self) -> dict[str, Tensor]:
         weights = self.slope_weights()
         modes = self._modes(weights)
         eigenvalues = None if modes is None else modes.eigenvalues
-        return flat_coefficients(weights, self._rho, bounces=self._bounces, eigenvalues=eigenvalues)
+        return flat_coefficients(
+            weights,
+            self._rho,
+            bounces=self._bounces,
+            eigenvalues=eigenvalues,
+            direct_weights=self.direct_weights(),
+        )
 
     def _modes(self, like: Tensor) -> CavityModes | None:
         if not self._bounces.modes:
             return None
         return modes_of(shared_slopes(self.nodes), self._bounces.modes, like.dtype, like.device)
+
+
+def _sides(slopes: tuple[float, ...], like: Tensor) -> dict[str, Tensor]:
+    """Cosine and tangent of slope angles, each (K,), rounded once. [-]"""
+    angle = like.new_tensor(slopes, dtype=torch.float64)
+    return {"cos_slope": angle.cos().to(like.dtype), "tan_slope": angle.tan().to(like.dtype)}
 
 
 @final
@@ -101,23 +122,32 @@ class RoughSurface(SharedSlopes):
     Args:
         albedo: facet albedo rho, scalar, (channel,) or (..., channel). [-] in [0, 1]
         sigma: roughness, scalar or (...). [rad] in [0, pi/2]; 0 is Lambert exactly, without a jump.
-        nodes: shared slope angles, the flat facet included.
-        order: azimuth nodes on each piece of the interreflection.
-        graded: split the pieces and thicken the nodes where the integrand turns, at 3 times the cost: two bounces
-            are then good to 1e-8 at order 16.
+        nodes: shared slope angles of the interreflection, the flat facet included; direct light, whose kinks are
+            sharper, takes 2 nodes - 1.
+        order: azimuth nodes where one direction is cut; twice as many on each side where both are.
+        graded: grade the nodes to where the integrand turns, at 2 to 3 times the cost: two bounces are then good to
+            1e-8 at order 16.
         bounces: 1 (direct), 2 or "all" inside a cavity.
         modes: eigenmodes a slope that carry three and more bounces.
     Components: direct, two_bounce, higher (those followed).
     Raises: ValueError outside the domains, for nodes < 3, order < 1, modes outside 3..20 or another number of bounces.
-    Deviations: direct light up to 85 deg, sigma 2..90 deg, is within 2.9e-3 (3.1e-4 rms) of the integral at 16
-        nodes and 2.1e-4 (1.9e-5) at 48. Two bounces err by 1.7e-2 of their largest value at order 4 and 2.5e-3 at
-        order 5, most at retro-reflection from steep slopes. Three and more bounces at rho = 1 err by 1e-5 of the whole
-        (sigma = 0.3) to 1.5e-3 (sigma = 1) at 4 modes, 1e-7 to 5e-5 at 12. The light returned at rho = 1 exceeds 1 by
-        3e-3 at order 4 for sigma = 0.9, by 1e-4 at order 16. Below the node spacing some weights are negative (to
-        -0.8): the sum is accurate, the weights are no distribution; sample slopes with `sample_slope`. Beyond 85 deg
-        such a sum may turn negative: sigma = 0.01 at 89.9, 89.9, 180 deg gives -0.107 /sr at the default nodes, where
-        the integral is 0.0265. Kinks: at
-        light = view the zero subgradient is chosen; fractional powers where tan(theta) tan(theta_k) = 1.
+    Deviations: from the integral, two bounces, sigma 1e-3..pi/2 rad, rho 0.05 to 1, random directions, largest (rms),
+        as `examples/benchmarks/slopes.py --directions 250` prints them:
+
+        | nodes | up to 85 deg | 85 to 89 deg | 89 to 89.9 deg |
+        |---|---|---|---|
+        | 8 | 1.8e-3 (3e-4) | 6.7e-3 (6e-4) | 1.8e-2 (2e-3) |
+        | 16 | 5.1e-4 (8e-5) | 1.4e-3 (2e-4) | 1.8e-3 (2e-4) |
+        | 48 | 1.6e-4 (9e-6) | 1.1e-3 (1e-4) | 1.8e-3 (2e-4) |
+
+        Below 2e-2 (16 nodes) also where light and view oppose each other at 89.9 deg on sigma = 1e-3, the worst found.
+        Not negative in float64 down to cosines of 1e-6: no weight of a slope is, and no image of one. In float32 direct
+        light loses digits by cancellation: up to 1e-2 of the value at 89.9 deg. Three and more bounces at rho = 1 err
+        by 1e-5 of the whole (sigma = 0.3) to 1.5e-3 (sigma = 1) at 4 modes, 1e-7 to 5e-5 at 12. The light returned at
+        rho = 1 differs from 1 by up to 1.5e-3 at the defaults, and from 3 nodes by 1e-2, as direct light and the rest
+        have slopes of their own. Autograd takes the nodes' places for given where they do not matter to the integral:
+        it differs from differences of f by what the quadrature errs. Kinks: at light = view the zero subgradient is
+        chosen; fractional powers where tan(theta) tan(theta_k) = 1.
     Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
         (1995, DOI 10.1007/BF01679684), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
     """
@@ -131,7 +161,7 @@ class RoughSurface(SharedSlopes):
         albedo: ParameterValue = 0.5,
         sigma: ParameterValue = 0.3,
         nodes: int = 16,
-        order: int = 4,
+        order: int = 3,
         graded: bool = False,
         bounces: BounceCount = 2,
         modes: int = 4,
@@ -146,6 +176,12 @@ class RoughSurface(SharedSlopes):
 
     def slope_weights(self) -> Tensor:
         return gaussian_weights(self.sigma, nodes=self.nodes)
+
+    def direct_slopes(self) -> tuple[float, ...]:
+        return shared_slopes(2 * self.nodes - 1)
+
+    def direct_weights(self) -> Tensor:
+        return gaussian_weights(self.sigma, nodes=2 * self.nodes - 1)
 
     def sampling_roughness(self) -> Tensor:
         return equivalent_roughness(self.sigma)
@@ -196,7 +232,7 @@ class TabulatedRoughSurface(SharedSlopes):
         *,
         albedo: ParameterValue = 0.5,
         weights: Tensor | fixed,
-        order: int = 4,
+        order: int = 3,
         graded: bool = False,
         bounces: BounceCount = 2,
         modes: int = 4,
@@ -254,8 +290,7 @@ class ClosedFormRoughSurface(CltcSampled, ImageBRDF):
 
     def images(self, *coordinates: Tensor) -> Tensor:
         plane = SlopePlane(*(field[..., None] for field in coordinates))
-        slopes = plane.dot.new_tensor(shared_slopes(self.nodes), dtype=torch.float64)
-        slope = {"cos_slope": slopes.cos().to(plane.dot.dtype), "tan_slope": slopes.tan().to(plane.dot.dtype)}
+        slope = _sides(shared_slopes(self.nodes), plane.dot)
         return torch.cat((direct_mean_paper(plane, **slope), two_bounce_mean_paper(plane, **slope)), -1)
 
     def component_coefficients(self) -> dict[str, Tensor]:

@@ -15,7 +15,8 @@ from torchbrdf import (
     fixed,
     gaussian_heightfield,
 )
-from torchbrdf.models.heightfield.fast import _BYTES_AT_A_TIME, heightfield_fields
+from torchbrdf.models.heightfield.fast import heightfield_fields
+from torchbrdf.models.network import BYTES_AT_A_TIME
 from torchbrdf.testing import random_directions
 
 ALBEDOS = f64([0.1, 0.3, 0.5, 0.7, 0.9, 0.95])
@@ -101,7 +102,7 @@ def test_above_zero_and_bounded_up_to_the_horizon():
 
 def test_pieces_change_nothing():
     # more pixels than are worked on at a time, each with its sigma and albedo, and their gradients
-    count = _BYTES_AT_A_TIME // 8 + 100
+    count = BYTES_AT_A_TIME // 8 + 100
     generator = torch.Generator().manual_seed(2)
     directions = random_directions(count, dtype=F64, generator=generator)
     sigma = (1.5 * torch.rand(count, dtype=F64, generator=generator)).requires_grad_()

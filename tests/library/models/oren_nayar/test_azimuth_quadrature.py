@@ -5,12 +5,14 @@ from helpers.facet_means import CASES, azimuth_mean, facets, plane_and_slope
 
 from torchbrdf.models.oren_nayar.azimuth import saturated_correlation, saturated_lobes
 from torchbrdf.models.oren_nayar.azimuth_quadrature import two_bounce_mean
+from torchbrdf.models.oren_nayar.slope_plane import SlopePlane
 
 
 @pytest.mark.filterwarnings("ignore:.*roundoff.*")
 @pytest.mark.parametrize("case", CASES)
 def test_two_bounce_mean_is_the_integral(case):
     plane, slope = plane_and_slope(*case)
+    plane, slope = SlopePlane(*(field[None] for field in plane)), {name: side[None] for name, side in slope.items()}
     lobes = saturated_lobes(plane, **slope)
     expected = azimuth_mean(facets(*case)[1], *case, rtol=1e-11)
     correlation = saturated_correlation(plane, lobes)
