@@ -20,6 +20,7 @@ from torch import Tensor
 from torchbrdf import (
     EON,
     FastGaussianHeightfield,
+    FastRoughSurface,
     FieldBRDF,
     FujiiOrenNayar,
     OrenNayar,
@@ -58,6 +59,7 @@ def models_of(x: Inputs) -> dict[str, FieldBRDF]:
         "QualitativeOrenNayar": QualitativeOrenNayar(albedo=x.albedo, sigma=x.rough),
         "FujiiOrenNayar": FujiiOrenNayar(albedo=x.albedo, roughness=x.rough),
         "EON": EON(albedo=x.albedo, roughness=x.rough),
+        "FastRoughSurface": FastRoughSurface(albedo=x.albedo, sigma=x.rough),
         "FastGaussianHeightfield": FastGaussianHeightfield(albedo=x.albedo, sigma=x.rough),
     }
 
