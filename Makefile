@@ -20,6 +20,7 @@ bench: .venv/ready
 	$(BIN)/python examples/benchmarks/series.py --output output --points 131072
 	$(BIN)/python examples/benchmarks/cost_of_models.py
 	OMP_NUM_THREADS=1 $(BIN)/python examples/benchmarks/eager.py
+	OMP_NUM_THREADS=1 $(BIN)/python examples/benchmarks/kernel.py
 
 clean:
 	rm -rf .venv build output *.egg-info .pytest_cache .ruff_cache
@@ -29,5 +30,5 @@ clean:
 .venv/ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install -q -c constraints.txt torch
-	$(BIN)/pip install -q -c constraints.txt -e ".[inverse,plots,dev]"
+	$(BIN)/pip install -q -c constraints.txt -e ".[inverse,plots,fast,dev]"
 	touch $@

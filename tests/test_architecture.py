@@ -124,7 +124,7 @@ def test_no_module_is_hidden_by_a_public_name(package):
 
 
 # Each takes as long to import as what imports it, and most programs never use it.
-DEFERRED = ("torch._dynamo", "torch._inductor", "sympy", "scipy", "kornia", "skimage", "matplotlib", "numba")
+DEFERRED = ("torch._dynamo", "torch._inductor", "sympy", "scipy", "kornia", "skimage", "matplotlib", "llvmlite")
 
 
 def test_heavy_packages_are_imported_where_they_are_used():

@@ -46,6 +46,7 @@ from torchbrdf.fresnel import (
     schlick,
 )
 from torchbrdf.interpolation.images import TableGrid
+from torchbrdf.kernels import native
 from torchbrdf.linear import ImageBRDF, LinearBRDF
 from torchbrdf.mixture import WeightedSum
 from torchbrdf.models.ashikhmin_shirley import (
@@ -293,6 +294,7 @@ __all__ = [  # noqa: RUF022 - in plain order
     "is_per_texel",
     "lambert_sphere_fast",
     "minnaert",
+    "native",
     "oren_nayar",
     "phong_radiance",
     "polarised_specular_reflectivity",

@@ -6,6 +6,7 @@ from torch import Tensor
 
 from torchbrdf.brdf import BRDF, total
 from torchbrdf.directions import Cosines
+from torchbrdf.kernels import by_kernel
 
 
 class FieldBRDF(BRDF):
@@ -14,6 +15,16 @@ class FieldBRDF(BRDF):
     Everything but the last step works on one number a pixel, whatever the number of channels; for a material per
     texel that takes half the time of coefficients by channel.
     """
+
+    def forward(
+        self, normal: Tensor, light: Tensor, view: Tensor, *, tangent: Tensor | None = None, normalize: bool = False
+    ) -> Tensor:
+        """As `BRDF.forward`; by a compiled kernel where one is to be had (see `torchbrdf.native`)."""
+        if tangent is None and not normalize:
+            value = by_kernel(self, normal, light, view)
+            if value is not None:
+                return value
+        return super().forward(normal, light, view, tangent=tangent, normalize=normalize)
 
     @abstractmethod
     def fields(self, cosines: Cosines) -> tuple[Tensor, ...]:

@@ -8,6 +8,7 @@ at most, beside the directions and the material. A single direction is timed by 
 """
 
 import argparse
+import math
 import time
 from collections.abc import Callable
 
@@ -43,6 +44,7 @@ from torchbrdf import (
     QualitativeOrenNayar,
     TorranceSparrow,
     fixed,
+    native,
     unchecked,
 )
 
@@ -202,4 +204,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with native(math.inf):  # compiled kernels have a table of their own, of kernel.py
+        main()

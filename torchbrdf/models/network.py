@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
+from torchbrdf._constants import constant
+
 # Bytes of one field worked on at a time: a dozen of them stay in a core's cache.
 BYTES_AT_A_TIME = 131072
 
@@ -51,7 +53,7 @@ def _affine(bias: Tensor, matrix: Tensor, columns: Tensor) -> Tensor:
     return total
 
 
-@torch.compiler.assume_constant_result
+@constant
 def _products_are_shortened(device: str) -> bool:
     """Whether a matrix product may be made in half precision or in TF32."""
     return torch.get_float32_matmul_precision() != "highest" or torch.is_autocast_enabled(device)

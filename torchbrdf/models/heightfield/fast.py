@@ -9,8 +9,9 @@ import torch
 from torch import Tensor
 
 from torchbrdf import effects
-from torchbrdf.brdf import BRDF, Option
+from torchbrdf.brdf import Option
 from torchbrdf.directions import Cosines
+from torchbrdf.fields import FieldBRDF
 from torchbrdf.models.heightfield.coordinates import Coordinates, coordinates, slope_squared
 from torchbrdf.models.network import Network, bounded, pixel_by_pixel
 from torchbrdf.models.rungs import Member, lambert, stand_ins
@@ -67,9 +68,9 @@ def fields_from(place: Coordinates, network: Network) -> HeightfieldFields:
 
 
 def reflectance(albedo: Tensor, fields: HeightfieldFields) -> dict[str, Tensor]:
-    """The named parts (..., channel) [1/sr]: rho f_1, rho^2 f_2, rho^3 f_3/(1 - rho kept)."""
+    """The named parts (..., channel) [1/sr] of fields (..., 1): rho f_1, rho^2 f_2, rho^3 f_3/(1 - rho kept)."""
     rho = torch.atleast_1d(albedo)
-    direct, two, third, kept = (field[..., None] for field in fields)
+    direct, two, third, kept = fields
     squared = rho * rho
     return {
         "direct": rho * direct,
@@ -105,12 +106,13 @@ def fast_gaussian_heightfield(cosines: Cosines, *, albedo: Tensor, sigma: Tensor
     """
     ALBEDO.check("fast_gaussian_heightfield: albedo", albedo)
     ROUGHNESS.check("fast_gaussian_heightfield: sigma", sigma)
-    parts = reflectance(albedo, heightfield_fields(cosines, sigma))
+    fields = (field[..., None] for field in heightfield_fields(cosines, sigma))
+    parts = reflectance(albedo, HeightfieldFields(*fields))
     return cosines.zero_below_horizon(parts["direct"] + parts["two_bounce"] + parts["higher"])
 
 
 @final
-class FastGaussianHeightfield(CltcSampled, BRDF):
+class FastGaussianHeightfield(CltcSampled, FieldBRDF):
     """Fit of the Gaussian heightfield as a module; see `fast_gaussian_heightfield` for equation, units and deviations.
 
     Args:
@@ -135,8 +137,8 @@ class FastGaussianHeightfield(CltcSampled, BRDF):
         """What unit albedo returns, each (...) [1/sr]; finite below the horizon."""
         return heightfield_fields(cosines, self.sigma)
 
-    def evaluate_components(self, cosines: Cosines) -> dict[str, Tensor]:
-        return reflectance(self.albedo, self.fields(cosines))
+    def parts_of(self, *fields: Tensor) -> dict[str, Tensor]:
+        return reflectance(self.albedo, HeightfieldFields(*fields))
 
     def members(self) -> list[Member]:
         """The ladder up to this model."""
