@@ -104,10 +104,10 @@ def fast_rough_surface(cosines: Cosines, *, albedo: Tensor, sigma: Tensor, bounc
     Returns: f_r (..., channel) [1/sr], above 0; zero unless light and view are above the horizon.
     Raises: ValueError when albedo or sigma leave their domains, or for other bounces.
     Deviations: a fit. From the exact model, rho 0.1 to 0.9 and sigma 2 to 60 deg, on points it was not fitted to, two
-        or all bounces: rms 0.12 % and at most 0.9 % up to 85 deg, rms 0.13 % where they crowd at grazing, in the plane
-        of incidence and at light = view; rms 0.29 %, at most 6 %, from 85 to 89 deg. Worst at sigma = 60 deg and
-        rho = 0.9: rms 0.27 %. At rho = 1 with all bounces rms 0.23 %, at most 6.4 % (next to the normal, steep facets),
-        and the directional albedo is within 1.5e-3 of 1 up to 85 deg. The derivative by sigma errs by 1-4 % rms, from
+        or all bounces: rms 0.11 % and at most 1.3 % up to 85 deg, rms 0.13 % where they crowd at grazing, in the plane
+        of incidence and at light = view; rms 0.23 %, at most 5 %, from 85 to 89 deg. Worst at sigma = 60 deg and
+        rho = 0.9: rms 0.20 %. At rho = 1 with all bounces rms 0.22 %, at most 6.3 % (next to the normal, steep facets),
+        and the directional albedo is within 1.7e-3 of 1 up to 85 deg. The derivative by sigma errs by 1-4 % rms, from
         sigma = 50 deg or rho = 0.9 on by 2-9 %, at rho = 1 by up to 17 %. Like the exact model it has a cone at
         light = view, with subgradient 0, and no other kink. Beyond 89 deg: f cos stays bounded, no figures.
     Source: fitted here to the exact model (`examples/fast_fit`).
