@@ -21,8 +21,7 @@ from torchbrdf.parameters import (
 from torchbrdf.quadrature import gauss_legendre
 
 # Relative index of a dielectric seen from either side; total internal reflection below 1.
-# No matter has an index nearer to 0 than a hundredth; at 0 itself the formulas are 0/0.
-RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1, least=0.01)
+RELATIVE_INDEX = Interval(0.0, math.inf, trailing=1)
 
 
 def schlick(cos: Tensor, *, f0: Tensor) -> Tensor:
@@ -88,7 +87,7 @@ def conductor(cos: Tensor, *, eta: Tensor, k: Tensor) -> Tensor:
 
     Args:
         cos: cosine c of incidence, broadcasts with eta and k. [-] in (0, 1]
-        eta, k: real and imaginary part of the relative index. [-] > 0, >= 0; 0/0 at 0 and 0
+        eta, k: real and imaginary part of the relative index. [-] >= 0
     Returns: F, shapes broadcast. [-]
     Deviations: none; k = 0 is `dielectric`.
     Source: Born & Wolf 1999, Principles of Optics, 7th edition, DOI 10.1017/CBO9781139644181, ch. 14.
@@ -98,8 +97,9 @@ def conductor(cos: Tensor, *, eta: Tensor, k: Tensor) -> Tensor:
     a = root(a_squared)
     r_s = ((cos - a) ** 2 + b_squared) / ((cos + a) ** 2 + b_squared)
     absorbed = cos * cos * b_squared
-    p_over_s = ((cos * a - sine_squared) ** 2 + absorbed) / ((cos * a + sine_squared) ** 2 + absorbed)
-    return 0.5 * r_s * (1 + p_over_s)
+    # R_p/R_s = 1 - 4 c a s^2/(...): also where light falls straight on an index of 0, and both terms of the ratio are 0
+    p_below_s = 4 * cos * a * sine_squared / positive((cos * a + sine_squared) ** 2 + absorbed)
+    return 0.5 * r_s * (2 - p_below_s)
 
 
 def conductor_amplitudes(cos: Tensor, *, eta: Tensor, k: Tensor) -> tuple[Tensor, Tensor]:
@@ -117,7 +117,9 @@ def conductor_amplitudes(cos: Tensor, *, eta: Tensor, k: Tensor) -> tuple[Tensor
     q = refracted_cosine(cos, eta, k)
     sine_squared = ((1 - cos) * (1 + cos)).relu()
     s = (cos - q) / (cos + q)
-    return s, -s * (cos * q - sine_squared) / (cos * q + sine_squared)
+    through = cos * q + sine_squared
+    # 1 - 2 s^2/(...), with the smallest normal number for 0/0 where light falls straight on an index of 0
+    return s, s * (2 * sine_squared / (through + torch.finfo(cos.dtype).tiny) - 1)
 
 
 def refracted_cosine(cos: Tensor, eta: Tensor, k: Tensor) -> Tensor:
@@ -256,7 +258,7 @@ class Dielectric(Fresnel):
 
 @final
 class Conductor(Fresnel):
-    """`conductor` with complex index eta + i k, each scalar, (channel,) or (..., channel). [-] >= 0.01, >= 0"""
+    """`conductor` with complex index eta + i k, each scalar, (channel,) or (..., channel). [-] >= 0"""
 
     eta: Constrained = Constrained(RELATIVE_INDEX)
     k: Constrained = Constrained(ABSORPTION_INDEX)

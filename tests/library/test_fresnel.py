@@ -122,3 +122,17 @@ def test_fresnel(case):
     close(conductor(cos, eta=eta, k=k), case["F2"], 1e-12)
     for got, expected in zip(conductor_amplitudes(cos, eta=eta, k=k), (case["rs"], case["rp"]), strict=True):
         assert abs(complex(got) - complex(*map(float, expected))) < 1e-15
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_an_index_of_zero_reflects_all(dtype):
+    """Straight on, too, where the ratio of p to s light is 0/0: the limit of small indices."""
+    cos = torch.tensor(COSINES, dtype=dtype)
+    nothing = torch.zeros((), dtype=dtype)
+    assert_close(conductor(cos, eta=nothing, k=nothing), torch.ones_like(cos), rtol=0, atol=2e-7)
+    for amplitude in conductor_amplitudes(cos, eta=nothing, k=nothing):
+        assert_close(amplitude.abs(), torch.ones_like(cos), rtol=0, atol=2e-7)
+    eta = torch.tensor(1e-4, dtype=dtype, requires_grad=True)
+    value = conductor(cos, eta=eta, k=nothing)
+    assert_close(value.detach(), torch.ones_like(cos), rtol=0, atol=5e-4)
+    assert torch.autograd.grad(value.sum(), eta)[0].isfinite()

@@ -211,9 +211,9 @@ def test_a_domain_may_end_before_its_coordinate_does():
     ("make", "ends", "beyond"),
     [
         (lambda x: TorranceSparrow(sigma=fixed(x)), [1e-3, math.pi / 2], [0.0, 1e-4]),
-        (lambda x: GGX(alpha=0.3, fresnel=Conductor(eta=fixed(x), k=fixed(0.0))), [0.01, 1e3], [0.0, 1e-4]),
-        (lambda x: GGX(alpha=0.3, fresnel=Conductor(eta=fixed(x), k=fixed(3.0))), [0.01, 1e3], [0.0]),
-        (lambda x: HeTorrance(sigma0=0.1, tau=1.0, wavelength=0.5, eta=fixed(x)), [0.01, 1e3], [0.0]),
+        (lambda x: GGX(alpha=0.3, fresnel=Conductor(eta=fixed(x), k=fixed(0.0))), [0.0, 1e-4, 1e3], [-1e-3]),
+        (lambda x: GGX(alpha=0.3, fresnel=Conductor(eta=fixed(x), k=fixed(3.0))), [0.0, 1e3], [math.nan]),
+        (lambda x: HeTorrance(sigma0=0.1, tau=1.0, wavelength=0.5, eta=fixed(x)), [0.0, 1e3], [-1e-3]),
         (lambda x: HeTorrance(sigma0=0.1, tau=fixed(1.0), wavelength=fixed(x)), [1.0000001e-9, 1e3], [1e-12, 1e-15]),
     ],
     ids=["facets", "transparent", "metal", "waves: index", "waves: length"],

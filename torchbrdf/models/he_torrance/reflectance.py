@@ -83,7 +83,7 @@ def he_torrance(
         tau: distance at which the autocorrelation of heights falls to 1/e, scalar or (...). [length] > 0
         wavelength: of each channel, scalar or (channel,). [length] > 0
             sigma0, tau and wavelength share one unit, whichever; only their ratios count.
-        eta, k: real and imaginary part of the index, scalar, (channel,) or (..., channel). [-] >= 0.01, >= 0
+        eta, k: real and imaginary part of the index, scalar, (channel,) or (..., channel). [-] >= 0
         diffuse: a, light reflected by anything but the surface itself, as a hemispherical reflectance; scalar,
             (channel,) or (..., channel). [-] in [0, 1]
     Returns: f_r (..., channel) [1/sr], zero unless light and view are above the horizon.
