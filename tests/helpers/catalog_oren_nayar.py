@@ -91,7 +91,7 @@ OREN_NAYAR = [
     ),
     Model(
         "rough surface",
-        lambda dtype: RoughSurface(albedo=colour(dtype), sigma=number(0.5, dtype), nodes=4, order=3),
+        lambda dtype: RoughSurface(albedo=colour(dtype), sigma=number(0.5, dtype), nodes=4, order=6),
         captured=False,
         integral=KINKED,
         float32=STEEP,

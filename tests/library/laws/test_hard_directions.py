@@ -42,6 +42,8 @@ WEIGHTS = torch.from_numpy(np.linalg.solve(np.vander(POINTS, increasing=True).T,
 NOTHING = 1e-20  # [1/sr] the tail of a lobe, which changes by orders of magnitude within a step, is no concern
 STEP = 4e-4  # of the cosine of the more grazing direction
 
+# Kinks of 1e-10 in the value, where pieces of the converged quadrature change places, over a step of 7e-5.
+COARSE_DIFFERENCES = {"rough surface, white, all bounces": 3e-6}
 NOT_BETWEEN = {
     "tabulated": "piecewise linear in three angles: in these directions several kinks meet, and any corner of them "
     "is a derivative",
@@ -142,7 +144,8 @@ def test_derivative_is_one_or_lies_between_two(model: Model):
     # Where the BRDF has a kink (the cone at light = view, the larger of two polar angles, |cos(dphi)|, the bound of a
     # masking term) autograd may give any number between the derivatives of both sides, and no other.
     outside = slopes(sharpened(model.make(torch.float64))).outside()
-    wrong = {case: f"{x:.1e}" for case, x in zip(CASES, outside.tolist(), strict=True) if not x <= TOLERANCE}
+    tolerance = COARSE_DIFFERENCES.get(model.name, TOLERANCE)
+    wrong = {case: f"{x:.1e}" for case, x in zip(CASES, outside.tolist(), strict=True) if not x <= tolerance}
     assert not wrong
 
 
