@@ -143,7 +143,7 @@ class RoughSurface(SharedSlopes):
         Below 2e-2 (16 nodes) also where light and view oppose each other at 89.9 deg on sigma = 1e-3, the worst found.
         Not negative in float64 down to cosines of 1e-6: no weight of a slope is, and no image of one. In float32 direct
         light loses digits by cancellation: up to 1e-2 of the value at 89.9 deg. Three and more bounces at rho = 1 err
-        by 1e-5 of the whole (sigma = 0.3) to 1.5e-3 (sigma = 1) at 4 modes, 1e-7 to 5e-5 at 12: photographs of rho = 0.9
+        by 1e-5 of the whole (sigma = 0.3) to 1.5e-3 (sigma = 1) at 4 modes, 1e-7 to 5e-5 at 12: photographs of rho .9
         and sigma = 50 deg are fitted with 0.4 deg too much at 4 modes, 0.04 at 6. The light returned at rho = 1 differs
         from 1 by up to 1.5e-3 at the defaults, and from 3 nodes by 1e-2, as direct light and the rest have slopes of
         their own. Autograd takes the nodes' places for given where they do not matter to the integral: it differs from
