@@ -99,8 +99,14 @@ OREN_NAYAR = [
     Model(
         "rough surface, white, all bounces",
         lambda dtype: RoughSurface(
-            albedo=fixed(number(1.0, dtype)), sigma=number(0.5, dtype), nodes=3, order=6, graded=True, bounces="all"
-        ),
+            albedo=fixed(number(1.0, dtype)),
+            sigma=number(0.5, dtype),
+            nodes=3,
+            order=6,
+            graded=True,
+            bounces="all",
+            modes=4,
+        ),  # fmt: skip
         nodes=48,  # a kink of each of eight slopes
         energy_limit=1.0064,
         reason="direct light on 5 slopes, what bounces on 3: the sum conserves energy as the slopes grow in number",

@@ -242,7 +242,7 @@ def test_no_label_of_the_ladder_covers_another(load):
     (axis,) = figure.axes
     figure.draw_without_rendering()
     boxes = [text.get_window_extent() for text in axis.texts]
-    assert len(boxes) == 8  # the Pareto front of the record
+    assert len(boxes) == 9  # the Pareto front of the record
     inside = axis.get_window_extent()
     for k, box in enumerate(boxes):
         assert inside.x0 < box.x0

@@ -148,7 +148,8 @@ class RoughSurface(SharedSlopes):
         from 1 by up to 1.5e-3 at the defaults, and from 3 nodes by 1e-2, as direct light and the rest have slopes of
         their own. Autograd takes the nodes' places for given where they do not matter to the integral: it differs from
         differences of f by what the quadrature errs. Kinks: at light = view the zero subgradient is chosen; fractional
-        powers where tan(theta) tan(theta_k) = 1.
+        powers where tan(theta) tan(theta_k) = 1; with all bounces steps of some 1e-6 of the value next to the mirror
+        direction at 85 deg, where pieces of the quadrature change places.
     Source: Oren & Nayar 1994, "Generalization of Lambert's reflectance model", DOI 10.1145/192161.192213, long version
         (1995, DOI 10.1007/BF01679684), sections 4.1-4.3, eqs. (8)-(26) repaired; more bounces: own.
     """
