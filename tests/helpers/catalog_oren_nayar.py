@@ -106,7 +106,7 @@ OREN_NAYAR = [
             graded=True,
             bounces="all",
             modes=4,
-        ),  # fmt: skip
+        ),
         nodes=48,  # a kink of each of eight slopes
         energy_limit=1.0064,
         reason="direct light on 5 slopes, what bounces on 3: the sum conserves energy as the slopes grow in number",
