@@ -82,7 +82,7 @@ def test_float32_of_a_network_errs_as_the_formula_does(name):
     for mine, theirs, right in zip(by_kernel, by_torch, (value, *slopes), strict=True):
         # not the worst: of those at grazing, some digits short in both, a handful decides
         error, expected = ((t - right).abs().reshape(-1).quantile(0.95) for t in (mine, theirs))
-        assert error <= 1.2 * expected
+        assert error <= 1.5 * expected  # sums in another order, and one reciprocal for several quotients
 
 
 @pytest.mark.parametrize("single", [(0,), (1, 3), (2, 4)])
