@@ -147,9 +147,16 @@ IN_ONE_GRAPH_OF_ANY_SHAPE = ("lambert", "hapke")  # a bounded and an unbounded d
 IN_SEVERAL = pytest.mark.xfail(strict=True, reason="the modes of all bounces are found by numbers of Python")
 
 
+OF_ONE_SIZE = pytest.mark.xfail(
+    raises=IndexError, strict=True, reason="torch 2.13 loses track of the size of a constant table of any shape"
+)
+
+
 def marks(model):
     if model.name in IN_ONE_GRAPH_OF_ANY_SHAPE:
         return ()
+    if model.name.startswith("interpolated"):
+        return (pytest.mark.slow, OF_ONE_SIZE)
     several = model.name in ("rough surface, white, all bounces", "grooves, white, all bounces")
     return (pytest.mark.slow, IN_SEVERAL) if several else (pytest.mark.slow,)
 
