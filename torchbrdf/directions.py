@@ -53,7 +53,7 @@ class _computed_once:  # noqa: N801 - used as a decorator
     def __get__(self, instance: "Cosines", owner: type) -> Any:
         value = self.compute(instance)
         kept_without = torch.compiler.is_compiling() or not torch.is_inference_mode_enabled()
-        if torch.is_grad_enabled() or (kept_without and not instance.light.requires_grad):
+        if torch.is_grad_enabled() or (kept_without and not instance.differentiated):
             instance.__dict__[self.name] = value  # found before this descriptor from now on
         return value
 
@@ -160,6 +160,12 @@ class Cosines:
         result = cls(light, view, phase, above)
         result.__dict__["lit"] = lit
         return result
+
+    @property
+    def differentiated(self) -> bool:
+        """Whether a derivative by any of the directions may be asked for: one that is held has none."""
+        given = (self.light, self.view, self.phase, *(self.vectors or ()))
+        return any(t.requires_grad for t in (given if self.tangent is None else (*given, self.tangent)))
 
     @_computed_once
     def lit(self) -> Tensor:

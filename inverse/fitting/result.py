@@ -97,13 +97,15 @@ class FitResult:
         return image
 
     def save(self, path: str | Path) -> None:
-        """Write everything but the model's class to a file for `load`: tensors, numbers and text, no code."""
-        content = {field.name: getattr(self, field.name) for field in fields(self)}
+        """Write everything but the model's class to a file for `load`: tensors, numbers and text, no code. Of a planned
+        fit that is the fit, without the plan.
+        """
+        content = {field.name: getattr(self, field.name) for field in fields(FitResult)}
         content |= {"angles": sorted(self.angles), "model": self.model.state_dict()}
         torch.save(content, path)
 
-    @classmethod
-    def load(cls, path: str | Path, model: BRDF) -> "FitResult":
+    @staticmethod
+    def load(path: str | Path, model: BRDF) -> "FitResult":
         """What `save` wrote; a copy of `model`, one of the class that was fitted, takes the fitted parameters.
 
         Raises: OSError; ValueError for a file that is no result, or one of another model.
@@ -115,7 +117,7 @@ class FitResult:
             model = copy.deepcopy(model)
             model.load_state_dict(_shaped(model, content["model"]))
             content |= {"angles": frozenset(content["angles"]), "model": model}
-            return cls(**content)
+            return FitResult(**content)
         except Exception as error:  # torch raises what it meets
             kind = type(model).__name__
             raise ValueError(f"{path}: holds no result of {kind}: {error}") from error

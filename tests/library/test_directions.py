@@ -131,14 +131,19 @@ def test_derived_quantities_are_computed_once():
     assert g.sin_alpha is g.sin_alpha
 
 
+@pytest.mark.parametrize("moved", ["normal", "light", "view"])
 @pytest.mark.parametrize("quiet", [torch.no_grad, torch.inference_mode])
-def test_what_is_kept_has_the_derivatives_a_later_reader_asks_for(quiet):
-    vectors = {name: v.requires_grad_() for name, v in up().items()}
+def test_what_is_kept_has_the_derivatives_a_later_reader_asks_for(quiet, moved):
+    """Also where one vector alone has derivatives, and the others' cosines none."""
+    directions = random_directions(20, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
+    vectors = {name: v.requires_grad_(name == moved) for name, v in directions._asdict().items()}
     g, brdf = Cosines.of(**vectors), OrenNayar().double()
     with quiet():
         brdf.evaluate(g)
-    late = torch.autograd.grad(brdf.evaluate(g).sum(), vectors["light"])
-    assert_close(late, torch.autograd.grad(brdf(**vectors).sum(), vectors["light"]))
+        _ = g.half_phase, g.azimuth_sine, g.lit
+    late = torch.autograd.grad((brdf.evaluate(g)[:, 0] * g.half_phase[0]).sum(), vectors[moved])
+    fresh = Cosines.of(**vectors)
+    assert_close(late, torch.autograd.grad((brdf.evaluate(fresh)[:, 0] * fresh.half_phase[0]).sum(), vectors[moved]))
 
 
 def test_cosines_serve_many_materials(dtype):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from inverse import Distant, FitResult, Scene, Sensor, fit, read_image, render, sphere
+from inverse import Distant, FitResult, Scene, Sensor, fit, plan, read_image, render, sphere
 from inverse.report import write_report
 from torchbrdf import Lambert, OrenNayar, QualitativeOrenNayar
 
@@ -87,3 +87,13 @@ def test_no_image_of_several_points_a_pixel():
     result = fit(scene, render(scene, Lambert(albedo=0.5)).detach(), Lambert())
     with pytest.raises(ValueError, match="one point a pixel"):
         result.image("albedo")
+
+
+def test_a_planned_fit_is_saved_without_its_plan(tmp_path):
+    scene = Scene(sphere(12, 12), [Distant.from_angle(0), Distant.from_angle(40)])
+    truth = OrenNayar(albedo=0.5, sigma=0.5)
+    result = plan(scene, truth, 0.05).fit(render(scene, truth).detach())
+    result.save(tmp_path / "r.pt")
+    again = type(result).load(tmp_path / "r.pt", result.model)
+    assert type(again) is FitResult
+    assert str(again) == str(result)
